@@ -11,6 +11,7 @@ from ._grazing import grazing_form as grazing_form, GrazingForm as GrazingForm
 from ._lyapunov import lyapunov_spectrum as lyapunov_spectrum
 from ._nordmark import nordmark_map as nordmark_map, nordmark_window as nordmark_window
 from ._poincare import poincare_derivative as poincare_derivative
+from ._switching import switching_saltation as switching_saltation
 from .chatter import (
     adding_thresholds as adding_thresholds,
     beta_map as beta_map,

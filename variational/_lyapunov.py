@@ -18,6 +18,7 @@ from jaxcam.hybrid.codes import RowKind, RUNNING
 from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
+from ._switching import refuse_switched
 from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
 
 
@@ -112,6 +113,7 @@ def lyapunov_spectrum(
         t0,
         turn,
     )
+    refuse_switched(system, "lyapunov_spectrum")
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()
     if turn is None and system.period is None:

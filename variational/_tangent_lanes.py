@@ -58,7 +58,7 @@ def first_frames(batched, shared, length, states, t0, turns, settings):
 
 def _row(record, _):
     head = [record.kind, record.constraint, record.t]
-    flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
+    flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.mode]
     return [jnp.asarray(v) for v in (*head, *record.before, *record.after, *flags)]
 
 

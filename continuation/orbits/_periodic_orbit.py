@@ -8,7 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from jaxcam.hybrid import flow, HybridSystem, Settings, simulate, stroboscope
+from jaxcam.hybrid import (
+    flow,
+    HybridSystem,
+    Settings,
+    simulate,
+    stroboscope,
+    SwitchedSystem,
+)
 from jaxcam.hybrid.checks import check_start
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.hybrid.surface import gaps
@@ -77,6 +84,11 @@ def periodic_orbit(
         >>> int(orbit.impacts.count)
         1
     """
+    if isinstance(system, SwitchedSystem):
+        raise ValueError(
+            "orbits that cross switching surfaces are not followed; solve "
+            "jaxcam.hybrid.flow(...).state - state = 0 with continuation.follow"
+        )
     settings = Settings(tolerance=1e-12) if settings is None else settings
     system = as_arrays(system)
     system.check()

@@ -5,10 +5,12 @@ and Application of Bifurcations in Systems with Impacts and Chattering*, Univers
 Naples Federico II, 2008; `jaxcam.citation("thesis")` prints its entry.
 """
 
+from ._corners import Corner as Corner, corners as corners
 from ._flow import flow as flow
 from ._settings import Settings as Settings
 from ._simulate import simulate as simulate
 from ._stroboscope import stroboscope as stroboscope
+from ._switched import SwitchedSystem as SwitchedSystem
 from ._system import HybridSystem as HybridSystem
 from .codes import RESULTS as RESULTS
-from .record import Trajectory as Trajectory
+from .record import Switches as Switches, Trajectory as Trajectory

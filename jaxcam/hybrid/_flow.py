@@ -117,7 +117,7 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     _, (carried, kept) = one_kernel(loop, on=not settings.plain)(start)
     return Arrival(
         state=jnp.stack(carried.x),
-        contact=jnp.stack(carried.contact),
+        contact=jnp.stack(carried.mode)[: functions.m],
         impacts=carried.impacts,
         steps=depend_on(carried.steps, kept),
         code=carried.status.astype(jnp.int32),

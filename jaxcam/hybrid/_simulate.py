@@ -12,6 +12,7 @@ from jaxtyping import Array, Int
 
 from ..parameters import as_arrays, FloatScalar, real_array, VectorLike
 from ._settings import Settings
+from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from ._types import RealScalar
 from ._untraced import prepare, run_untraced
@@ -19,7 +20,15 @@ from .checks import check_start, is_traced
 from .codes import RUNNING
 from .loop import Log, LoopState, run, run_reversible
 from .lowering import whole
-from .record import assemble, Contacts, Impacts, Parts, Steps, Trajectory
+from .record import (
+    assemble,
+    Contacts,
+    Impacts,
+    Parts,
+    Steps,
+    Switches,
+    Trajectory,
+)
 from .runge_kutta import tableau_of
 from .segments import simulate_segments
 from .surface import release_point
@@ -96,6 +105,10 @@ def simulate(
     if not traced:
         check_start(system, settings, t_start, state, t1)
     if engine == "diffeqsolve":
+        if isinstance(system, SwitchedSystem):
+            raise ValueError(
+                'engine="diffeqsolve" knows no switching surfaces; use engine="loop"'
+            )
         if traced:
             raise ValueError(
                 'engine="diffeqsolve" is driven from Python and cannot be traced by '
@@ -105,8 +118,8 @@ def simulate(
         log, contact, code = simulate_segments(
             system, settings, t_start, state, t1, budget, progress
         )
-        parts = _assemble(system, t_start, state, contact, log)
-        return Trajectory(system, settings, t0, t1, *_trim(parts), code)
+        parts = _trim(_assemble(system, t_start, state, contact, log))
+        return _trajectory(system, settings, t0, t1, parts, code)
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps
@@ -117,14 +130,21 @@ def simulate(
         )
         parts, code = of_rows(system, settings, t_start, state, t1, rows)
         if traced:
-            return Trajectory(system, settings, t0, t1, *parts, code)
+            return _trajectory(system, settings, t0, t1, parts, code)
     else:
         budget = 1_000_000 if max_steps is None else max_steps
-        log, contact, code = run_untraced(
+        log, mode, code = run_untraced(
             system, settings, t_start, state, t1, budget, progress
         )
-        parts = _assemble(system, t_start, state, contact, log)
-    return Trajectory(system, settings, t0, t1, *_trim(parts), code)
+        parts = _assemble(system, t_start, state, mode, log)
+    return _trajectory(system, settings, t0, t1, _trim(parts), code)
+
+
+def _trajectory(system, settings, t0, t1, parts: Parts, code) -> Trajectory:
+    impacts, contacts, steps, switches = parts
+    return Trajectory(
+        system, settings, t0, t1, impacts, contacts, steps, code, switches
+    )
 
 
 def _chosen(settings, tolerance, solver, max_step) -> Settings:
@@ -193,21 +213,21 @@ def _reversible(system, settings, t0, state, t1, rows: int):
 
 def _of_rows(runner, system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, True)
-    contact = jnp.stack(carried.contact)
+    mode = jnp.stack(carried.mode)
     # an invalid start is not integrated
     state = jnp.where(carried.status == RUNNING, state, jnp.nan)
     carried, log = runner(functions, plan, carried, rows)
-    return assemble(system, t0, state, contact, log, (rows, rows)), _code(carried)
+    return assemble(system, t0, state, mode, log, (rows, rows)), _code(carried)
 
 
-def _assemble(system, t0, state, contact, log: Log) -> Parts:
+def _assemble(system, t0, state, mode, log: Log) -> Parts:
     """Assemble the parts of a run that is not traced."""
-    t0, state, contact, log = jax.tree.map(np.asarray, (t0, state, contact, log))
+    t0, state, mode, log = jax.tree.map(np.asarray, (t0, state, mode, log))
     log = Log(*(part[log.kind > 0] for part in log))
-    rows, width = log.contact.shape
+    rows, width = log.mode.shape
     # contacts at the start do not belong to any row
     sizes = rows, width * (rows + 1)
-    return assemble(system, t0, state, contact, log, sizes, np)
+    return assemble(system, t0, state, mode, log, sizes, np)
 
 
 @jax.jit
@@ -225,11 +245,13 @@ def _trim(parts: Parts) -> Parts:
             lambda a: np.asarray(a)[:number].copy() if a.ndim else a, part
         )
 
-    impacts, contacts, steps = jax.device_put([cut(part) for part in parts])
+    known = [part for part in parts if part is not None]
+    impacts, contacts, steps, *rest = jax.device_put([cut(part) for part in known])
     return Parts(
         _as(Impacts, impacts),
         _as(Contacts, contacts),
         _as(Steps, steps),
+        _as(Switches, rest[0]) if rest else None,
     )
 
 

@@ -230,6 +230,7 @@ def _starts(batched, shared, period, t0, states):
         length = system.period if period is None else period
         behind, values = starts_behind(system, t0, state)
         length = jnp.asarray(length, dtype=jnp.float64)
-        return jnp.min(values), behind, length, restitutions(system, t0, state)
+        least = jnp.min(values) if values.size else jnp.zeros(())
+        return least, behind, length, restitutions(system, t0, state)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)

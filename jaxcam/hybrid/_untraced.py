@@ -30,7 +30,7 @@ _CHUNK = 2048
 def run_untraced(
     system, settings, t0, state, t1, budget: int, progress: Callable | None
 ) -> tuple[Log, Any, Int[Array, ""]]:
-    """Return log, initial contacts and result code of a run of at most `budget` rows.
+    """Return log, initial mode and result code of a run of at most `budget` rows.
 
     A run that has not ended by then has the code `RUNNING`.
     """
@@ -77,7 +77,7 @@ def _by_llvm(system, settings, t0, state, t1, budget, progress):
     numbers, lane = laid_out(carried)
     loop = attempts_of(key_of(static, nothing, layout, carried, _row, 1))
     place = jax.tree.unflatten(lane.structure, range(len(numbers)))
-    contact = np.array([numbers[k] > 0.5 for k in place.contact])
+    mode = np.array([numbers[k] > 0.5 for k in place.mode])
     numbers, own = numbers[None], np.zeros((1, 0))
     tables, used = [], 0
     while True:
@@ -90,16 +90,16 @@ def _by_llvm(system, settings, t0, state, t1, budget, progress):
             break
         _said(progress, numbers[0, place.t], t0, t1)
     _said(progress, t1, t0, t1)
-    log = log_of(np.concatenate(tables), len(place.x), len(place.contact))
-    return log, contact, jnp.asarray(numbers[0, place.status], jnp.int32)
+    log = log_of(np.concatenate(tables), len(place.x))
+    return log, mode, jnp.asarray(numbers[0, place.status], jnp.int32)
 
 
 @eqx.filter_jit
 def _begin(system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, False)
-    contact = jnp.stack(carried.contact)
+    mode = jnp.stack(carried.mode)
     carried, log = run(functions, plan, carried, rows, "one")
-    return carried, log, contact
+    return carried, log, mode
 
 
 @eqx.filter_jit
@@ -111,7 +111,7 @@ def _go_on(system, settings, t0, state, t1, carried: LoopState, rows):
 def _by_xla(system, settings, t0, state, t1, budget, progress):
     case = system, settings, t0, state, t1
     size = min(_CHUNK, budget)
-    carried, log, contact = _begin(*case, size)
+    carried, log, mode = _begin(*case, size)
     logs, used = [log], size
     while float(carried.status) == RUNNING and used < budget:
         _said(progress, carried.t, t0, t1)
@@ -120,4 +120,4 @@ def _by_xla(system, settings, t0, state, t1, budget, progress):
         used += size
     _said(progress, t1, t0, t1)
     whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
-    return whole, contact, jnp.asarray(carried.status, jnp.int32)
+    return whole, mode, jnp.asarray(carried.status, jnp.int32)

@@ -10,6 +10,7 @@ from jax.core import Tracer
 from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 
 from ._settings import Settings
+from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from .loop import starts_behind
 from .surface import check_restitution, restitutions
@@ -99,6 +100,10 @@ def check_system(system, t0, state) -> None:
     if signature not in _WELL_SHAPED:
         _check_shapes(system, t0, state)
     system.check()
+    if isinstance(system, SwitchedSystem) and not np.all(
+        np.asarray(system.hysteresis) >= 0
+    ):
+        raise ValueError(f"hysteresis is {system.hysteresis}; it cannot be negative")
     check_restitution(system, _restitutions(system, t0, state))
     if signature is not None:
         _WELL_SHAPED.add(signature)
@@ -156,7 +161,10 @@ def _check_shapes(system, t0, state) -> None:
             f"impact returns shape {after.shape}, but gap has shape {gap.shape} and "
             f"the state {(n,)}; return shape {(*gap.shape, n)}, one row for each gap"
         )
-    for name, made in (("vector_field", rate), ("gap", gap), ("impact", after)):
+    made_by = {"vector_field": rate, "gap": gap, "impact": after}
+    if isinstance(system, SwitchedSystem):
+        made_by |= _switched_shapes(system, t0, state)
+    for name, made in made_by.items():
         if made.dtype != jnp.float64:
             raise ValueError(
                 f"{name} returns {made.dtype}; use 64-bit floats (importing jaxcam "
@@ -164,10 +172,41 @@ def _check_shapes(system, t0, state) -> None:
             )
 
 
-def _shape(system, name, t0, state):
+def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
+    """Return what the functions of switching surfaces return."""
+    switch = _shape(system, "switching", t0, state)
+    if len(switch.shape) > 1 or switch.shape == (0,):
+        raise ValueError(
+            f"switching returns shape {switch.shape}; return a scalar or a vector, one "
+            "number for each surface"
+        )
+    k, n = max(switch.size, 1), state.shape[0]
+    sides = _shape(system, "sides", t0, state)
+    if sides.shape != (k,):
+        raise ValueError(
+            f"sides returns shape {sides.shape} for {k} surfaces; return {(k,)}, +1 or "
+            "-1 for each"
+        )
+    given = jax.ShapeDtypeStruct((k,), jnp.float64)
+    after = _shape(system, "reset", t0, state, given)
+    if after.shape != (*switch.shape, n):
+        raise ValueError(
+            f"reset returns shape {after.shape} but switching has shape {switch.shape} "
+            f"and the state {(n,)}; return shape {(*switch.shape, n)}, one row for each "
+            "surface"
+        )
+    if np.shape(system.hysteresis) not in ((), (k,)):
+        raise ValueError(
+            f"hysteresis has shape {np.shape(system.hysteresis)}; give a number, or "
+            f"one for each of the {k} surfaces"
+        )
+    return {"switching": switch, "sides": sides, "reset": after}
+
+
+def _shape(system, name, *arguments):
     """Return shape and type of the result of a user's function."""
     try:
-        made = jax.eval_shape(getattr(system, name), t0, state)
+        made = jax.eval_shape(getattr(system, name), *arguments)
     except (ConcretizationTypeError, TracerArrayConversionError) as error:
         raise ValueError(
             f"{name} needs the values of time or state, which are not "

@@ -17,6 +17,8 @@ class RowKind(enum.IntEnum):
     CONTACT = 4
     RELEASE = 5
     STOP = 6
+    # the crossing of a switching surface
+    SWITCH = 7
 
 
 class _ByCode(type(eqx.Enumeration)):
@@ -67,6 +69,12 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
         "constraint comes to rest before impacts on the next begin."
     )
     """Impacts on several constraints accumulate together."""
+    slides = (
+        "The motion slides along a switching surface, or its crossings accumulate: both "
+        "branches of the vector field point to the surface. State it as a "
+        "jaxcam.filippov.FilippovSystem, which slides, or give the switch a hysteresis."
+    )
+    """The motion slides along a switching surface."""
 
 
 _ITEMS = (
@@ -77,10 +85,18 @@ _ITEMS = (
     RESULTS.behind,
     RESULTS.backward,
     RESULTS.together,
+    RESULTS.slides,
 )
-FINISHED, RUNNING, STEP_FAILED, NOT_FINITE, BEHIND, BACKWARD, TOGETHER = map(
-    float, range(len(_ITEMS))
-)
+(
+    FINISHED,
+    RUNNING,
+    STEP_FAILED,
+    NOT_FINITE,
+    BEHIND,
+    BACKWARD,
+    TOGETHER,
+    SLIDES,
+) = map(float, range(len(_ITEMS)))
 """Codes: the index of each item above. The status of a batch element is one of them."""
 
 

@@ -1,6 +1,9 @@
-"""Systems with impacts, Filippov systems, cams and restitution laws."""
+"""Systems with impacts or switching surfaces, Filippov systems, cams and restitution
+laws.
+"""
 
 from ._belt_oscillator import BeltOscillator as BeltOscillator
+from ._bilinear_oscillator import BilinearOscillator as BilinearOscillator
 from ._bouncing_ball import BouncingBall as BouncingBall
 from ._cam_follower import CamFollower as CamFollower
 from ._contact_load import (
@@ -10,6 +13,7 @@ from ._contact_load import (
 )
 from ._desmodromic import DesmodromicCam as DesmodromicCam
 from ._forced_oscillator import ForcedOscillator as ForcedOscillator
+from ._gear_backlash import GearBacklash as GearBacklash
 from ._impact_oscillator import ImpactOscillator as ImpactOscillator
 from ._piecewise_linear import (
     PiecewiseLinear as PiecewiseLinear,

@@ -14,6 +14,7 @@ from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import real_array, VectorLike
 from jaxcam.tables import ShortTable
 
+from .._switching import refuse_switched
 from ._at_impact import after_and_speeds, ImpactStart, start_at_impact
 from ._closing import close, Knots
 from ._gap_sizes import gap_sizes
@@ -136,6 +137,7 @@ def orbit_of(
         ['impact']
     """
     refuse_tracers("orbit_of", "jaxcam.hybrid.flow", system, state, period, t0)
+    refuse_switched(system, "orbit_of")
     settings = Settings(tolerance=1e-12) if settings is None else settings
     if period is None:
         if system.period is None:

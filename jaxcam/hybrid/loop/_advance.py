@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 
 from ..breakpoints import declared
-from ..codes import FINISHED, NOT_FINITE, RUNNING, STEP_FAILED, TOGETHER
+from ..codes import FINISHED, NOT_FINITE, RUNNING, SLIDES, STEP_FAILED, TOGETHER
 from ..runge_kutta import Tableau, tableau_of
 from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
-from ._loop_state import LoopState
+from ._loop_state import closed, LoopState
 from ._release import CLOSE
 from ._scale import moved_extents, says_nothing
 from ._select import any_of, select
@@ -110,7 +110,7 @@ class Attempt(NamedTuple):
 
     t: Any
     x: tuple
-    contact: tuple
+    mode: tuple
     jets: tuple
     # the jets before the event at the end of the step
     arrived: tuple
@@ -129,8 +129,11 @@ class Attempt(NamedTuple):
     guess: tuple
     stopped: Any
     lands: Any
-    # which constraint was hit
+    # which constraint was hit, or surface crossed
     hit: list
+    # a constraint is hit; or the motion slides along the surface it has reached
+    strikes: Any
+    slides: Any
     # a flight hidden by rounding
     hidden: Any
     begins: Any
@@ -162,7 +165,7 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
     return LoopState(
         t=jnp.where(good, attempt.t, carried.t),
         x=select(good, attempt.x, select(waiting, attempt.guess, carried.x)),
-        contact=select(good, attempt.contact, carried.contact),
+        mode=select(good, attempt.mode, carried.mode),
         jets=tuple(
             Jet(*select(good, new, old))
             for new, old in zip(attempt.jets, carried.jets, strict=True)
@@ -182,13 +185,14 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
         held=tuple(map(stop_gradient, select(good, attempt.held, carried.held))),
         struck=struck,
         crowded=crowded,
+        crossed=_crossed(carried, attempt),
         origin=carried.origin,
         extents=moved_extents(carried.extents, carried.origin, attempt),
         ramp=stop_gradient(jnp.where(good, 6.0 * carried.ramp, carried.ramp)),
         failures=failures,
         status=_status(plan, carried, attempt, failures, crowded),
         steps=carried.steps + jnp.where(active, 1.0, 0.0),
-        impacts=carried.impacts + jnp.where(good & attempt.lands, 1.0, 0.0),
+        impacts=carried.impacts + jnp.where(good & attempt.strikes, 1.0, 0.0),
         chatters=carried.chatters + jnp.where(good & attempt.begins, 1.0, 0.0),
     )
 
@@ -225,7 +229,8 @@ def _next_length(plan, carried, attempt, longest):
     # the step that completes a chatter did not follow the motion
     whole = (h > 0) & ~carried.completing
     inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
-    for k, (jet, contact) in enumerate(zip(attempt.jets, attempt.contact, strict=True)):
+    flags = closed(attempt.mode, len(carried.held))
+    for k, (jet, contact) in enumerate(zip(attempt.jets, flags, strict=True)):
         ends = carried.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
         held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
@@ -248,11 +253,20 @@ def _struck(carried, attempt):
         return carried.struck, carried.crowded
     struck = tuple(
         jax.lax.stop_gradient(jnp.where(attempt.good & now, attempt.t, before))
-        for now, before in zip(attempt.hit, carried.struck, strict=True)
+        for now, before in zip(attempt.hit, carried.struck, strict=False)
     )
     (crowded,) = carried.crowded
     more = jnp.where(attempt.hidden, crowded + 1.0, 0.0)
-    return struck, (jnp.where(attempt.good & attempt.lands, more, crowded),)
+    return struck, (jnp.where(attempt.good & attempt.strikes, more, crowded),)
+
+
+def _crossed(carried, attempt):
+    """Return the time of the last crossing of a switching surface."""
+    if not carried.crossed:
+        return carried.crossed
+    now = attempt.good & attempt.lands & ~attempt.strikes
+    time = jnp.where(now, attempt.t, carried.crossed[0])
+    return (jax.lax.stop_gradient(time),)
 
 
 def _together(carried):
@@ -272,5 +286,10 @@ def _status(plan, carried, attempt, failures, crowded):
     if carried.struck:
         stuck = (failures > _PATIENCE) | (crowded[0] > _PATIENCE)
         status = jnp.where(stuck & ~bad & _together(carried), TOGETHER, status)
+    if carried.crossed:
+        room = _TOGETHER * carried.longest
+        just = ~bad & (failures > _PATIENCE) & (carried.t - carried.crossed[0] <= room)
+        slides = attempt.good & attempt.slides
+        status = jnp.where(just | slides, SLIDES, status)
     status = jnp.where(reached, FINISHED, status)
     return jnp.where(carried.status == RUNNING, status, carried.status)

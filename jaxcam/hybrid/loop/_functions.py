@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._switched import SwitchedSystem
 from .._system import HybridSystem
 from ..lowering import joined, scalarise, split
 from ..runge_kutta import rates_among
@@ -24,7 +25,12 @@ from ..surface import (
     normal_acceleration,
     normal_directions,
     normal_velocity,
+    OnSides,
+    resets,
     speed_rounding,
+    surfaces,
+    switched_jet,
+    switched_rounding,
 )
 from ._gap_polynomial import Jet
 
@@ -41,6 +47,10 @@ class Frame(NamedTuple):
 class Functions:
     """Functions of `(t, x)` with `x` a tuple of scalars and the parameters bound.
 
+    The discrete `mode` is a tuple of flags: whether each of the `m` constraints is in
+    contact, then whether the motion is on the negative side of each of the `k`
+    switching surfaces. Without surfaces, most functions do not depend on it.
+
     `planar` systems have two states and one constraint: gap and normal velocity
     determine the state during contact, which then needs no integration. `plain`
     functions are called unchanged, with arrays.
@@ -51,17 +61,22 @@ class Functions:
         time = jax.ShapeDtypeStruct((), jnp.float64)
         state = jax.ShapeDtypeStruct((n,), jnp.float64)
         m = jax.eval_shape(lambda t, x: gaps(system, t, x), time, state).shape[0]
+        k = jax.eval_shape(lambda t, x: surfaces(system, t, x), time, state).shape[0]
         flags = jax.ShapeDtypeStruct((m,), jnp.bool_)
+        sides = jax.ShapeDtypeStruct((k,), jnp.bool_)
         shapes = jax.tree.map(
             lambda p: jax.ShapeDtypeStruct(p.shape, p.dtype), parameters
         )
-        self.n, self.m = n, m
+        self.n, self.m, self.k = n, m, k
         self.plain = plain
-        self.planar = n == 2 and m == 1
+        self.planar = n == 2 and m == 1 and k == 0
         self._parameters = jax.tree.map(split, parameters)
         self._memory: dict | None = None
 
-        def bind(function, *example):
+        def bind(function, *example, whole_field=k == 0):
+            if not whole_field:
+                function, example = on_sides(function), (*example, sides)
+
             def whole(p, *arguments):
                 return function(eqx.combine(p, static), *arguments)
 
@@ -78,14 +93,21 @@ class Functions:
             self._taylor = bind(_free_taylor, time, state, flags)
         else:
             self._field = bind(field_in_force, time, state, flags)
-            self._jets = bind(mode_jet, time, state, flags)
+            jets = switched_jet if k else mode_jet
+            self._jets = bind(jets, time, state, flags)
             self._taylor = bind(_mode_taylor, time, state, flags)
         self._free = bind(lambda s, t, x: s.vector_field(t, x), time, state)
+        blur = switched_rounding if k else gap_rounding
+        self._blur = bind(blur, time, state, state)
+        if k:
+            self._resets = bind(resets, time, state)
+            self._sides = bind(_negative, time, state, whole_field=True)
+        if not m:
+            return
         self._impact = bind(impacts, time, state)
         self._velocity = bind(normal_velocity, time, state)
         self._frame = bind(_frame, time, state)
         self._lift = bind(_lift, time, state)
-        self._blur = bind(gap_rounding, time, state, state)
         self._speed_blur = bind(speed_rounding, time, state, state)
         self._chatter = bind(completion_coefficients, time, state, state)
 
@@ -101,40 +123,65 @@ class Functions:
         finally:
             self._memory = None
 
-    def field(self, t, x, contact):
-        """Return the rate of change: flight, or (not planar) sticking in contact."""
-        return tuple(self._field(t, _pack(x), _pack(contact)))
+    def _side(self, mode) -> tuple:
+        """Return the sides of a mode as arguments: none without surfaces."""
+        return (_pack(mode[self.m :]),) if self.k else ()
 
-    def pairs(self, t, x) -> dict[int, int]:
+    def field(self, t, x, mode):
+        """Return the rate of change of the state in flight or, unless the system is
+        planar, in contact.
+        """
+        contact = _pack(mode[: self.m])
+        return tuple(self._field(t, _pack(x), contact, *self._side(mode)))
+
+    def pairs(self, t, x, mode) -> dict[int, int]:
         """Return which components of the state are rates of others: see
         `rates_among`.
         """
-        return rates_among(x, tuple(self._free(t, _pack(x))))
+        return rates_among(x, tuple(self._free(t, _pack(x), *self._side(mode))))
 
-    def jets(self, t, x, contact) -> list[Jet]:
-        """Return one jet for each constraint."""
-        rows = self._jets(t, _pack(x), _pack(contact))
-        return [Jet(*rows[k]) for k in range(self.m)]
+    def jets(self, t, x, mode) -> list[Jet]:
+        """Return one jet for each constraint, then one for each surface."""
+        contact = _pack(mode[: self.m])
+        rows = self._jets(t, _pack(x), contact, *self._side(mode))
+        return [Jet(*rows[k]) for k in range(self.m + self.k)]
 
-    def taylor(self, t, x, contact):
+    def taylor(self, t, x, mode):
         """Return the first, second and third time derivatives of the state as three
         tuples.
         """
-        rows = self._taylor(t, _pack(x), _pack(contact))
+        contact = _pack(mode[: self.m])
+        rows = self._taylor(t, _pack(x), contact, *self._side(mode))
         return tuple(tuple(row) for row in rows)
 
-    def impact(self, t, x):
-        """Return the state after an impact at each constraint."""
-        rows = self._impact(t, _pack(x))
-        return [tuple(rows[k]) for k in range(self.m)]
+    def impact(self, t, x, mode):
+        """Return the state after an impact at each constraint, then after the crossing
+        of each surface.
+        """
+        side = self._side(mode)
+        rows = []
+        if self.m:
+            rows = [tuple(row) for row in self._impact(t, _pack(x), *side)]
+        if self.k:
+            rows += [tuple(row) for row in self._resets(t, _pack(x), *side)]
+        return rows
 
-    def velocity(self, t, x):
+    def sides(self, t, x) -> tuple:
+        """Return for each surface whether a start is on its negative side."""
+        return tuple(self._sides(t, _pack(x))) if self.k else ()
+
+    def velocity(self, t, x, mode):
         """Return the normal velocities."""
-        return tuple(self._velocity(t, _pack(x)))
+        if not self.m:
+            return ()
+        return tuple(self._velocity(t, _pack(x), *self._side(mode)))
 
-    def frame(self, t, x) -> Frame:
+    def frame(self, t, x, mode) -> Frame:
         """Return the `Frame` at this state."""
-        lift, push, lift_velocity, damping = self._frame(t, _pack(x))
+        if not self.m:
+            return Frame((), (), (), ())
+        parts = self._frame(t, _pack(x), *self._side(mode))
+        lift, push, lift_velocity, damping = parts
         return Frame(
             tuple(map(tuple, lift)),
             tuple(map(tuple, push)),
@@ -142,33 +189,42 @@ class Functions:
             tuple(damping),
         )
 
-    def lift(self, t, x):
-        """Return the directions in which the gaps grow by one."""
-        return tuple(map(tuple, self._lift(t, _pack(x))))
+    def lift(self, t, x, mode):
+        """Return for each gap the displacement of the state that increases it by one."""
+        if not self.m:
+            return ()
+        return tuple(map(tuple, self._lift(t, _pack(x), *self._side(mode))))
 
-    def blur(self, t, x, extents):
-        """Return the rounding errors of the gaps, for components up to `extents`."""
+    def blur(self, t, x, extents, mode):
+        """Return the rounding errors of the gaps, then of the distances of surfaces,
+        for components up to `|x| + extents`.
+        """
         reach = [jnp.abs(a) + b for a, b in zip(x, extents, strict=True)]
-        return tuple(self._blur(t, _pack(x), _pack(reach)))
+        return tuple(self._blur(t, _pack(x), _pack(reach), *self._side(mode)))
 
-    def speed_blur(self, t, x):
+    def speed_blur(self, t, x, mode):
         """Return the rounding error of the normal velocities."""
+        if not self.m:
+            return ()
         reach = [jnp.abs(a) for a in x]
-        return tuple(self._speed_blur(t, _pack(x), _pack(reach)))
+        side = self._side(mode)
+        return tuple(self._speed_blur(t, _pack(x), _pack(reach), *side))
 
-    def chatter(self, t, before, after):
-        """Return C, r0 and the state P of `_chatter.py` for each constraint."""
-        damping, restitution, rest = self._chatter(t, _pack(before), _pack(after))
+    def chatter(self, t, before, after, mode):
+        """Return C, r0 and the state P of `surface/_chatter.py` for each constraint."""
+        side = self._side(mode)
+        parts = self._chatter(t, _pack(before), _pack(after), *side)
+        damping, restitution, rest = parts
         return tuple(damping), tuple(restitution), tuple(map(tuple, rest))
 
-    def onto(self, frame: Frame, jets, x, contact):
+    def onto(self, frame: Frame, jets, x, mode):
         """Take one Newton step of the state towards gap = normal velocity = 0."""
         for k in range(self.m):
             gap, velocity = jets[k].gap, jets[k].velocity
             slip = velocity - gap * frame.lift_velocity[k]
             x = tuple(
                 jnp.where(
-                    contact[k],
+                    mode[k],
                     x[i] - gap * frame.lift[k][i] - slip * frame.push[k][i],
                     x[i],
                 )
@@ -184,9 +240,23 @@ def _pack(scalars) -> np.ndarray:
     return out
 
 
+def on_sides(function):
+    """Convert a `function` of a system to one on given sides, its last argument."""
+
+    def call(system, *arguments):
+        *rest, negative = arguments
+        return function(OnSides(system, negative), *rest)
+
+    return call
+
+
+def _negative(system: SwitchedSystem, t, x):
+    return system.sides(t, x) < 0
+
+
 def _planar_jet(system, t, x, contact):
-    """Return the free jet; in contact, the rate of a along the sticking motion is j - C
-    a.
+    """Return the free jet; in contact, the rate of the normal acceleration `a` along
+    the sticking motion is `j - C a`, with the jerk `j`.
     """
     jet = free_jet(system, t, x)
     direction = normal_directions(system, t, x)[0]

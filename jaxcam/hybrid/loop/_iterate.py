@@ -33,7 +33,7 @@ class Record(NamedTuple):
     t: Any
     before: tuple
     after: tuple
-    contact: tuple
+    mode: tuple
 
 
 class Judged(NamedTuple):
@@ -74,7 +74,7 @@ def _iterate(
     chatter, begins = landing.chatter, landing.begins
 
     # contact: the state is moved onto the surface a second time, then checked
-    settled = functions.onto(made.frame, landing.jets, landing.x, landing.contact)
+    settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
     near = [
         jnp.abs(a - b) <= 1e-7 * (jnp.abs(a) + w)
         for a, b, w in zip(settled, landing.x, made.scale, strict=True)
@@ -90,7 +90,7 @@ def _iterate(
     # the state and the jets to continue with
     delay = jnp.where(reached, held.offset, 0.0)
     left = taylor_of_release(
-        functions, settled, made.rates, made.frame, landing.jets, delay, landing.contact
+        functions, settled, made.rates, made.frame, landing.jets, delay, landing.mode
     )
     x, jets = off_rounding(
         made.frame, landing.jets, landing.x, landing.hit, carried.extents
@@ -101,22 +101,23 @@ def _iterate(
     went = [released & (held.constraint == k) for k in range(functions.m)]
     # a multiplier that only reaches zero has not released
     pressing = sticking & good & ~lands & ~released & ~carried.completing
-    contact = tuple(
-        (landing.contact[k] | (begins & landing.hit[k])) & ~went[k] & active
+    mode = tuple(
+        (landing.mode[k] | (begins & landing.hit[k])) & ~went[k] & active
         for k in range(functions.m)
     )
+    mode = mode + tuple(landing.mode[functions.m :])
     jets = _next_jets(carried, jets, landing, went, pressing, delay)
     if plan.breaks:
         # the motion after a breakpoint is evaluated on its far side
         passed = end.at_stop & (end.stop < end.asked) & good & ~lands & ~released
-        jets = _where_passed(functions, plan, passed, t, x, contact, jets)
+        jets = _where_passed(functions, plan, passed, t, x, mode, jets)
     finite = jnp.isfinite(sum(x) + t + sum(j.gap + j.velocity for j in jets))
     good = good & finite
     stopped = end.at_stop & (end.stop >= end.asked) & good & ~lands & ~released
     attempt = Attempt(
         t=t,
         x=x,
-        contact=contact,
+        mode=mode,
         jets=jets,
         arrived=tuple(made.jets),
         tried=tuple(jnp.abs(b - a) for a, b in zip(carried.x, made.raw, strict=True)),
@@ -133,12 +134,14 @@ def _iterate(
         lands=lands,
         hit=landing.hit,
         hidden=landing.hidden,
+        strikes=landing.strikes,
+        slides=landing.slides,
         begins=begins,
         locates=locates,
         released=released,
         fastest=landing.fastest,
         fixed=jnp.where(locates, end.length + delay, chatter.duration),
-        blur=functions.blur(landing.seen, landing.x, carried.extents),
+        blur=functions.blur(landing.seen, landing.x, carried.extents, landing.mode),
         held=tuple(
             jnp.where(c, new, old)
             for c, new, old in zip(
@@ -147,13 +150,17 @@ def _iterate(
         ),
     )
     kind = _kind(carried, lands, begins, released, stopped)
+    if functions.k:
+        crosses = lands & ~landing.strikes & ~landing.slides
+        kind = jnp.where(crosses, float(RowKind.SWITCH), kind)
+        kind = jnp.where(landing.slides, float(RowKind.STEP), kind)
     record = Record(
         kind=jnp.where(good & active, kind, float(RowKind.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
         t=t,
         before=select(lands, landing.impact.before, x),
         after=select(begins, landing.impact.after, x),
-        contact=contact,
+        mode=mode,
     )
     return after_attempt(plan, carried, attempt), record
 
@@ -164,10 +171,11 @@ def _judge_flights(
     """Detect events at the gaps that are open."""
     h, jets = end.length, made.jets
     slack = [2e-12 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
+    closed = carried.closed
     flown = earliest(
         [
             _where_in_force(
-                ~carried.contact[k],
+                ~closed[k],
                 judge(
                     carried.jets[k],
                     jet,
@@ -187,9 +195,9 @@ def _judge_flights(
     # to it
     held = [
         jnp.maximum(s, natural * natural * jnp.abs(j.acceleration))
-        for s, j in zip(carried.held, carried.jets, strict=True)
+        for s, j in zip(carried.held, carried.jets, strict=False)
     ]
-    tiny = [r + 1e-15 * s for r, s in zip(rounding, held, strict=True)]
+    tiny = [r + 1e-15 * s for r, s in zip(rounding, held, strict=False)]
     fits = made.effort <= 1.0
     active = carried.status == RUNNING
     waits = _waits_for_release(carried, jets, flown, natural, tiny)
@@ -205,6 +213,9 @@ def _judge_contacts(
     carried: LoopState, end: StepEnd, landing: Landing, judged: Judged
 ) -> StepVerdict:
     """Detect events at the gaps that are closed."""
+    if not carried.held:
+        h, no = end.length, jnp.asarray(False)
+        return StepVerdict(no, jnp.full_like(h, jnp.inf), no, 0.0 * h, 0.0 * h)
     return earliest(
         [
             _where_in_force(
@@ -220,7 +231,7 @@ def _judge_contacts(
                     carried.locating,
                 ),
             )
-            for k, jet in enumerate(landing.jets)
+            for k, jet in enumerate(landing.jets[: len(carried.held)])
         ]
     )
 
@@ -254,6 +265,9 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
     hit, chatter, after = landing.hit, landing.chatter, []
     for k, jet in enumerate(jets):
         ends = landing.begins & hit[k]
+        if k >= len(went):
+            after.append(jet)
+            continue
         held = jnp.where(
             pressing & carried.contact[k],
             jnp.minimum(jet.acceleration, 0.0),
@@ -284,14 +298,14 @@ def _waits_for_release(carried, jets, flown, natural, tiny):
         return jnp.asarray(False)
     lets_go = [
         c & lets_go_before(jet, flown.offset, natural, least)
-        for c, jet, least in zip(carried.contact, jets, tiny, strict=True)
+        for c, jet, least in zip(carried.contact, jets, tiny, strict=False)
     ]
     return flown.lands & any_of(lets_go) & ~carried.completing
 
 
-def _where_passed(functions, plan, passed, t, x, contact, jets):
+def _where_passed(functions, plan, passed, t, x, mode, jets):
     """Return the jets on the far side of a breakpoint if one was passed."""
-    fresh = functions.jets(after(t, plan.t1 - plan.t0), x, contact)
+    fresh = functions.jets(after(t, plan.t1 - plan.t0), x, mode)
     return tuple(
         Jet(*select(passed, new, old)) for new, old in zip(fresh, jets, strict=True)
     )

@@ -5,13 +5,17 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ._advance import Plan
-from ._flight import StepVerdict
+from ._flight import moves_in, StepVerdict
 from ._functions import Functions
 from ._loop_state import LoopState
-from ._rest_of_chatter import Impact, Rest, rest_of_chatter
-from ._select import of_constraint, select
+from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
+from ._select import any_of, of_constraint, select
 from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
+
+
+# distance after a crossing, over the largest so far, that is the error of its location
+_NEAR = 1e-9
 
 
 class Landing(NamedTuple):
@@ -21,7 +25,7 @@ class Landing(NamedTuple):
     # the time at which functions are evaluated
     seen: Any
     x: tuple
-    contact: tuple
+    mode: tuple
     jets: list
     # which constraint was hit
     hit: list
@@ -32,6 +36,10 @@ class Landing(NamedTuple):
     fastest: Any
     # whether rounding hides the next flight, or the previous one
     hidden: Any
+    # whether a constraint is hit, not a switching surface crossed
+    strikes: Any
+    # whether the motion cannot leave the surface that it has reached
+    slides: Any
 
 
 def land(
@@ -49,9 +57,9 @@ def land(
     landed = taylor(made.x, made.rates, offset)
     t = end.t + offset
     seen = seen_from_inside(plan, end)(t)
-    after_each = functions.impact(seen, landed)
+    after_each = functions.impact(seen, landed, carried.mode)
     after = after_each[0]
-    for k in range(1, functions.m):
+    for k in range(1, len(after_each)):
         after = select(flown.constraint == k, after_each[k], after)
     approach = of_constraint(
         [
@@ -61,28 +69,52 @@ def land(
         flown.constraint,
     )
     x = select(lands, after, made.x)
-    contact = _kept_contacts(functions, carried, lands, seen, landed, x)
-    jets = functions.jets(seen, x, contact)
+    mode = _kept_contacts(functions, carried, lands, seen, landed, x)
+    mode = mode + tuple(
+        carried.mode[k] ^ (lands & (flown.constraint == k))
+        for k in range(functions.m, functions.m + functions.k)
+    )
+    jets = functions.jets(seen, x, mode)
+    hit = [lands & (flown.constraint == k) for k in range(len(jets))]
+    strikes, slides = lands, False
+    if functions.k:
+        strikes = any_of(hit[: functions.m])
+        jets, slides = _past_surfaces(functions, carried, jets, hit, rounding)
 
     # do the remaining impacts take negligible time?
-    hit = [lands & (flown.constraint == k) for k in range(functions.m)]
     rebound = jnp.maximum(
         of_constraint([j.velocity for j in jets], flown.constraint), 0.0
     )
-    fastest = jnp.where(lands, jnp.maximum(carried.fastest, rebound), carried.fastest)
+    higher = jnp.maximum(carried.fastest, rebound)
+    fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
-    chatter = rest_of_chatter(functions, plan, impact, jets, contact, end.stop)
+    if functions.m:
+        chatter = rest_of_chatter(functions, plan, impact, jets, mode, end.stop)
+    else:
+        chatter = no_rest(impact)
     # far enough into the sequence, or so low that rounding hides the next flight
     pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
     deep = rebound <= plan.depth * fastest
     # the height of a flight is v^2 / 2a; below 250 times the rounding, it is hidden
     low = 500 * of_constraint(carried.blur, flown.constraint)
-    begins = lands & chatter.possible & (deep | (rebound * rebound <= low * pulled))
+    begins = strikes & chatter.possible & (deep | (rebound * rebound <= low * pulled))
     hidden = _hides(
         carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
     )
     return Landing(
-        t, seen, x, contact, jets, hit, impact, chatter, begins, fastest, hidden
+        t,
+        seen,
+        x,
+        mode,
+        jets,
+        hit,
+        impact,
+        chatter,
+        begins,
+        fastest,
+        hidden,
+        strikes,
+        slides,
     )
 
 
@@ -91,14 +123,30 @@ def _kept_contacts(functions, carried, lands, t, before, after):
 
     A contact breaks if the impact changes its normal velocity by more than rounding.
     """
-    if functions.m == 1:
+    mode = carried.mode
+    if functions.m <= 1:
         return carried.contact
-    speeds = functions.velocity(t, before), functions.velocity(t, after)
-    rounding = functions.speed_blur(t, before), functions.speed_blur(t, after)
+    speeds = functions.velocity(t, before, mode), functions.velocity(t, after, mode)
+    rounding = [functions.speed_blur(t, x, mode) for x in (before, after)]
     return tuple(
         c & (~lands | (jnp.abs(new - old) <= 500 * (a + b)))
         for c, old, new, a, b in zip(carried.contact, *speeds, *rounding, strict=True)
     )
+
+
+def _past_surfaces(functions, carried, jets, hit, rounding):
+    """Return the jets after the crossing of a surface, whose distance is then zero.
+
+    With a hysteresis it is twice that, and after a reset any. Also returned is whether
+    the motion is driven back, so that it would slide.
+    """
+    jets, slides = list(jets), []
+    for k in range(functions.m, len(jets)):
+        near = _NEAR * carried.scale[k] + 4 * carried.blur[k]
+        on = hit[k] & (jnp.abs(jets[k].gap) <= near)
+        jets[k] = jets[k]._replace(gap=jnp.where(on, 0.0, jets[k].gap))
+        slides.append(on & moves_in(jets[k], rounding[k]))
+    return jets, any_of(slides)
 
 
 def _hides(carried, t, impact, pulled, rounding):

@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ..codes import RUNNING
+from ..codes import RUNNING, SLIDES
 from ..surface import forced_time, start_room
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._scale import first_extents, first_step
 from ._select import any_of, select
-from ._start import first_status
+from ._start import first_sides, first_status
 
 
 class LoopState(NamedTuple):
@@ -19,7 +19,9 @@ class LoopState(NamedTuple):
 
     t: Any
     x: tuple
-    contact: tuple
+    # see `Functions`
+    mode: tuple
+    # of each constraint, then of each switching surface
     jets: tuple
     # the next step to try, and the longest one that the error allows
     step: Any
@@ -33,13 +35,15 @@ class LoopState(NamedTuple):
     scale: tuple
     # resolution of each gap
     blur: tuple
-    # largest gap that contact has suppressed: that of the multiplier over a natural
-    # step
+    # for each constraint, the largest gap that contact has suppressed: that of the
+    # multiplier over a natural step
     held: tuple
     # for several constraints: time of the last impact on each, and number of
     # consecutive impacts whose flights are below rounding
     struck: tuple
     crowded: tuple
+    # for switching surfaces: time of the last crossing
+    crossed: tuple
     # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
     extents: tuple
@@ -53,6 +57,21 @@ class LoopState(NamedTuple):
     # number of completed chatters
     chatters: Any
 
+    @property
+    def contact(self) -> tuple:
+        """Whether each constraint is in contact."""
+        return self.mode[: len(self.held)]
+
+    @property
+    def closed(self) -> tuple:
+        """For each jet, whether its constraint is in contact; a surface is not."""
+        return closed(self.mode, len(self.held))
+
+
+def closed(mode: tuple, constraints: int) -> tuple:
+    """Return the flags of contact, and False for each switching surface."""
+    return mode[:constraints] + tuple(jnp.asarray(False) for _ in mode[constraints:])
+
 
 def first_state(
     functions: Functions, t0, x, t1, longest=jnp.inf, period=jnp.inf
@@ -63,16 +82,21 @@ def first_state(
     An invalid start becomes NaN. `longest` is the longest allowed step (s), and
     `period` that of the forcing.
     """
-    free = tuple(jnp.asarray(False) for _ in range(functions.m))
-    jets = functions.jets(t0, x, free)
-    lifts = functions.lift(t0, x)
-    blurs = functions.blur(t0, x, (0.0,) * functions.n), functions.speed_blur(t0, x)
+    m, free = functions.m, tuple(jnp.asarray(False) for _ in range(functions.m))
+    sides, crossings, slides = first_sides(functions, t0, x, free)
+    free = free + sides
+    jets = functions.jets(t0, x, free)[:m] if m else []
+    lifts = functions.lift(t0, x, free)
+    whole = functions.blur(t0, x, (0.0,) * functions.n, free)
+    blurs = whole[:m], functions.speed_blur(t0, x, free)
     time = forced_time(period)
     tinies, slows = (
         [start_room(b, j.acceleration, s) for b, j in zip(each, jets, strict=True)]
         for each, s in zip(blurs, (time * time, time), strict=True)
     )
     status = first_status(t0, x, t1, [jet.gap for jet in jets], tinies)
+    if crossings:
+        status = jnp.where((status == RUNNING) & slides, SLIDES, status)
     origin, extents = first_extents(lifts, jets, tinies, x)
     contact, settled = [], []
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
@@ -98,14 +122,16 @@ def first_state(
     longest = jnp.minimum((t1 - t0) / 64, longest)
     # in contact, the error estimate may be uninformative, so the step length is limited
     held = any_of(contact)
-    rates = functions.taylor(t0, x, contact)
+    mode = tuple(contact) + sides
+    rates = functions.taylor(t0, x, mode)
+    settled += crossings
     first = jnp.where(held, longest, first_step(extents, rates, t0, longest))
     x = select(status == RUNNING, x, (jnp.nan,) * len(x))
     one = jnp.ones_like(t0)
     return LoopState(
         t=t0,
         x=x,
-        contact=tuple(contact),
+        mode=mode,
         jets=tuple(settled),
         step=first,
         longest=longest * one,
@@ -114,10 +140,11 @@ def first_state(
         stops=0.0 * one,
         fastest=0.0 * one,
         scale=tuple(jnp.abs(j.gap) for j in settled),
-        blur=tuple(map(jax.lax.stop_gradient, functions.blur(t0, x, extents))),
-        held=(0.0 * one,) * functions.m,
-        struck=(-jnp.inf * one,) * functions.m if functions.m > 1 else (),
-        crowded=(0.0 * one,) if functions.m > 1 else (),
+        blur=tuple(map(jax.lax.stop_gradient, functions.blur(t0, x, extents, mode))),
+        held=(0.0 * one,) * m,
+        struck=(-jnp.inf * one,) * m if m > 1 else (),
+        crowded=(0.0 * one,) if m > 1 else (),
+        crossed=(-jnp.inf * one,) if functions.k else (),
         origin=origin,
         extents=extents,
         ramp=first,

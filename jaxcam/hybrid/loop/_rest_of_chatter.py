@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ..surface import completion_time
+from ._loop_state import closed
 from ._select import of_constraint, select
 
 
@@ -30,14 +31,14 @@ class Impact(NamedTuple):
     constraint: Any
 
 
-def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Rest:
+def rest_of_chatter(functions, plan, impact: Impact, jets, mode, stop) -> Rest:
     """Complete the chatter after an impact; return whether the completion is valid.
 
-    **Arguments:** the `jets` of all gaps after the impact, the constraints in `contact`
-    then, and the time (s) of the next `stop` of the run.
+    **Arguments:** the `jets` after the impact and the `mode` then, and the time (s) of
+    the next `stop` of the run.
     """
     t, before, after, approach, rebound, constraint = impact
-    dampings, restitutions, states = functions.chatter(t, before, after)
+    dampings, restitutions, states = functions.chatter(t, before, after, mode)
     damping = of_constraint(dampings, constraint)
     r0 = of_constraint(restitutions, constraint)
     state = states[0]
@@ -58,9 +59,16 @@ def rest_of_chatter(functions, plan, impact: Impact, jets, contact, stop) -> Res
     at_end = a + rate * duration
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
     possible = possible & (a < 0) & (at_end < 0) & soon
-    for k, jet in enumerate(jets if functions.m > 1 else ()):
+    contact = closed(mode, functions.m)
+    for k, jet in enumerate(jets if len(jets) > 1 else ()):
         # no other gap closes in the meantime; over such a short time, it is a parabola
         left = jet.gap + duration * (jet.velocity + duration * jet.acceleration / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
         possible = possible & clear
     return Rest(possible, duration, state, a, rate)
+
+
+def no_rest(impact: Impact) -> Rest:
+    """Return that no chatter follows, for a system without constraints."""
+    zero = jnp.zeros_like(impact.t)
+    return Rest(jnp.asarray(False), zero, impact.after, zero, zero)

@@ -29,7 +29,7 @@ class Log(NamedTuple):
     t: Float[Array, " rows"]
     before: Float[Array, "rows n"]
     after: Float[Array, "rows n"]
-    contact: Float[Array, "rows m"]
+    mode: Float[Array, "rows flags"]
 
 
 Company = Literal["one", "few"]
@@ -49,7 +49,7 @@ def run(
     one row of the log is written for all of them at once.
     """
     carried, log = run_raw(functions, plan, carried, rows, _row, company)
-    return carried, log_of(log, functions.n, functions.m)
+    return carried, log_of(log, functions.n)
 
 
 def run_raw(
@@ -74,7 +74,7 @@ def run_raw(
     # time
     alone = company == "one"
     keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
-    width = len(row(_empty_record(functions.n, functions.m), carried))
+    width = len(row(_empty_record(functions.n, len(carried.mode)), carried))
     blocks = -(-rows // _BLOCK)
 
     def unfinished(carry):
@@ -130,7 +130,7 @@ def run_many(some: Callable, lanes: LoopState, rows: int, row):
     # the log is written in its final layout, because under `vmap` each write would move
     # all of it
     blocks, width = -(-rows // _BLOCK), len(lanes.status)
-    parts = row(_empty_record(len(lanes.x), len(lanes.jets)), lanes)
+    parts = row(_empty_record(len(lanes.x), len(lanes.mode)), lanes)
     log = [jnp.zeros((blocks * _BLOCK, width)) for _ in parts]
 
     def unfinished(carry):
@@ -174,13 +174,13 @@ def run_reversible(
 
     carried, log = jax.lax.scan(many, carried, None, length=blocks)
     log = log.reshape(blocks * block, -1)
-    return carried, log_of(log, functions.n, functions.m)
+    return carried, log_of(log, functions.n)
 
 
-def _empty_record(n: int, m: int) -> Record:
+def _empty_record(n: int, flags: int) -> Record:
     zero = 0.0
     state = (zero,) * n
-    return Record(zero, zero, zero, state, state, (zero,) * m)
+    return Record(zero, zero, zero, state, state, (zero,) * flags)
 
 
 def _row(record: Record, _: LoopState) -> list:
@@ -189,20 +189,20 @@ def _row(record: Record, _: LoopState) -> list:
 
 def numbers_of_row(record: Record) -> list:
     """Return the numbers of a row of the log."""
-    flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.contact]
+    flags = [jnp.asarray(c, dtype=jnp.float64) for c in record.mode]
     head = [record.kind, record.constraint, record.t]
     return [jnp.asarray(v) for v in head] + [*record.before, *record.after, *flags]
 
 
-def log_of(log, n: int, m: int) -> Log:
-    """Return the log of rows of numbers, of `n` components and `m` constraints."""
+def log_of(log, n: int) -> Log:
+    """Return the log of rows of numbers, for states of `n` components."""
     return Log(
         kind=log[:, 0],
         constraint=log[:, 1],
         t=log[:, 2],
         before=log[:, 3 : 3 + n],
         after=log[:, 3 + n : 3 + 2 * n],
-        contact=log[:, 3 + 2 * n : 3 + 2 * n + m],
+        mode=log[:, 3 + 2 * n :],
     )
 
 

@@ -75,7 +75,7 @@ def held_scales(scale, carried, push, pairs, h) -> tuple:
     multipliers (the accelerations of the jets) act; `pairs` is as in `scales`.
     """
     found = list(scale)
-    for jet, held, direction in zip(carried.jets, carried.contact, push, strict=True):
+    for jet, held, direction in zip(carried.jets, carried.closed, push, strict=False):
         speed = jnp.where(held, h * jnp.abs(jet.acceleration), 0.0)
         for j, share in enumerate(direction):
             found[j] = jnp.maximum(found[j], speed * jnp.abs(share))

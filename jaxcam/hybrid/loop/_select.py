@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 
 def any_of(flags) -> Any:
-    out = flags[0]
+    out = flags[0] if flags else jnp.asarray(False)
     for f in flags[1:]:
         out = out | f
     return out

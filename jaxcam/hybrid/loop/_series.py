@@ -13,12 +13,12 @@ def taylor(x, rates, tau):
     )
 
 
-def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
+def taylor_of_release(functions, x, rates, frame, jets, tau, mode):
     """Return the sticking motion over the short time `tau` (s) to release, to second
     order.
 
     **Arguments:** `rates` of the free flight from `x`, its `frame` and `jets`, and the
-    contacts.
+    mode.
     """
     first, second, _ = rates
     if not functions.planar:
@@ -30,7 +30,7 @@ def taylor_of_release(functions, x, rates, frame, jets, tau, contact):
     push = frame.push[0]
     return tuple(
         jnp.where(
-            contact[0],
+            mode[0],
             x[i]
             + tau * (first[i] - a * push[i] + tau * (second[i] - rate * push[i]) / 2),
             x[i],
@@ -48,7 +48,7 @@ def off_rounding(frame, jets, x, hit, extents):
     was hit is moving.
     """
     jets = list(jets)
-    for k, (direction, here) in enumerate(zip(frame.lift, hit, strict=True)):
+    for k, (direction, here) in enumerate(zip(frame.lift, hit, strict=False)):
         gap = jets[k].gap
         for a, b, extent in zip(x, direction, extents, strict=True):
             here = here & (jnp.abs(gap * b) <= 1e-6 * (jnp.abs(a) + extent))

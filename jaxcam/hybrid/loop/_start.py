@@ -1,9 +1,12 @@
-"""Reject invalid starts, traced or not."""
+"""Reject invalid starts, traced or not, and find the sides of surfaces they are on."""
 
 import jax.numpy as jnp
 
 from ..codes import BACKWARD, BEHIND, NOT_FINITE, RUNNING
 from ..surface import gaps, least_gaps
+from ._flight import moves_in
+from ._functions import Functions
+from ._gap_polynomial import Jet
 from ._select import any_of
 
 
@@ -23,3 +26,35 @@ def first_status(t0, x, t1, gaps, rooms):
     status = jnp.where(behind, BEHIND, RUNNING)
     status = jnp.where(finite, status, NOT_FINITE)
     return jnp.where(t1 < t0, BACKWARD, status)
+
+
+def first_sides(functions: Functions, t, x, contact):
+    """Return the sides of the switching surfaces on which a motion starts.
+
+    A start on a surface takes the side that its motion enters.
+
+    Returns:
+        Flags of the negative sides; the jets of the surfaces there; and whether the
+        motion would slide along a surface.
+    """
+    if not functions.k:
+        return (), [], False
+    m, sides = functions.m, list(functions.sides(t, x))
+    slides = jnp.asarray(False)
+
+    def jet_of(k, flag):
+        """Return the jet of a surface on one of its sides, and whether x is on it."""
+        mode = (*contact, *sides[:k], flag, *sides[k + 1 :])
+        jet = functions.jets(t, x, mode)[m + k]
+        rounding = functions.blur(t, x, (0.0,) * functions.n, mode)[m + k]
+        on = jnp.abs(jet.gap) <= rounding
+        jet = jet._replace(gap=jnp.where(on, 0.0, jet.gap))
+        return jet, on, on & moves_in(jet, rounding)
+
+    for k, flag in enumerate(sides):
+        _, _, leaves = jet_of(k, flag)
+        _, on, back = jet_of(k, ~flag)
+        slides = slides | (leaves & on & back)
+        sides[k] = flag ^ (leaves & ~back)
+    jets: list[Jet] = [jet_of(k, flag)[0] for k, flag in enumerate(sides)]
+    return tuple(sides), jets, slides

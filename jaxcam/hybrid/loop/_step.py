@@ -56,7 +56,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
     now = any_of(
         [
             jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j, near))
-            for j, c, near in zip(carried.jets, carried.contact, rounding, strict=True)
+            for j, c, near in zip(carried.jets, carried.closed, rounding, strict=True)
         ]
     )
     wanted = jnp.where(now, 0.0, jax.lax.stop_gradient(carried.step))
@@ -84,17 +84,17 @@ def make_step(
     inside, h = seen_from_inside(plan, end), end.length
     x, error, stages = step(
         plan.tableau,
-        lambda t, x: functions.field(inside(t), x, carried.contact),
+        lambda t, x: functions.field(inside(t), x, carried.mode),
         carried.t,
         carried.x,
         h,
     )
     seen = inside(end.t)
     pairs = rates_among(carried.x, stages[0])
-    frame = functions.frame(seen, x)
+    frame = functions.frame(seen, x, carried.mode)
     scale = scales(carried.extents, carried.x, x, pairs, h, plan.per_run)
     if not functions.planar:
-        pairs = functions.pairs(carried.t, carried.x)
+        pairs = functions.pairs(carried.t, carried.x, carried.mode)
         scale = held_scales(scale, carried, frame.push, pairs, h)
     allowed = error_allowed(scale, carried.x, x, plan.tolerance, plan.absolute)
     effort = error_norm(error, allowed)
@@ -103,7 +103,7 @@ def make_step(
         sticking = any_of(carried.contact)
         x = select(sticking, carried.x, x)
         effort = jnp.where(sticking, 0.0, effort)
-    jets = functions.jets(seen, x, carried.contact)
-    projected = functions.onto(frame, jets, x, carried.contact)
-    rates = functions.taylor(seen, projected, carried.contact)
+    jets = functions.jets(seen, x, carried.mode)
+    projected = functions.onto(frame, jets, x, carried.mode)
+    rates = functions.taylor(seen, projected, carried.mode)
     return Step(x, projected, jets, frame, rates, effort, scale)

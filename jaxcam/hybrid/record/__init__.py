@@ -6,6 +6,7 @@ from ._events import (
     impact_table as impact_table,
     Impacts as Impacts,
     Steps as Steps,
+    Switches as Switches,
 )
 from ._printed import Printed as Printed, vector_text as vector_text
 from ._trajectory import Trajectory as Trajectory

@@ -8,10 +8,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._switched import SwitchedSystem
 from ..codes import RowKind
 from ..loop import Log, rows_of_kind
-from ..surface import normal_velocity
-from ._events import Contacts, Impacts, Steps
+from ..surface import normal_velocity, surfaces
+from ._events import Contacts, Impacts, Steps, Switches
 
 
 # Numbers of velocities for which programs are compiled: the smallest, and the growth
@@ -25,17 +26,20 @@ class Parts(NamedTuple):
     impacts: Impacts
     contacts: Contacts
     steps: Steps
+    switches: Switches | None
 
 
 def assemble(
-    system, t0, state, contact, log: Log, sizes: tuple[int, int], xp: ModuleType = jnp
+    system, t0, state, mode, log: Log, sizes: tuple[int, int], xp: ModuleType = jnp
 ) -> Parts:
-    """Sort the rows of a log into impacts, contacts and steps of fixed lengths.
+    """Sort the rows of a log into impacts, contacts, steps and crossings of fixed
+    lengths; `mode` are the flags at the start.
 
     With `xp=numpy`, a log that is not traced is sorted without compilation.
     """
     rows = log.kind.shape[0]
-    max_impacts, max_contacts = sizes
+    k = _surfaces(system, t0, state)
+    m = mode.shape[0] - k
     valid = log.kind > 0
     order = _places(xp, valid, rows, rows)
     count = xp.sum(valid)
@@ -45,9 +49,54 @@ def assemble(
         return xp.concatenate([start[None], padded[order]])
 
     time = first(t0, log.t, xp.inf)
-    kept = first(contact, log.contact > 0.5, False)
-    steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1)
+    kept = first(mode, log.mode > 0.5, False)
+    sides = xp.where(kept[:, m:], -1.0, 1.0) if k else None
+    kept = kept[:, :m] if k else kept
+    steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1, sides)
+    switches = _switches(xp, log, m, sizes[0]) if k else None
+    if not m:
+        return Parts(*_nothing(xp, state, log), steps, switches)
+    impacts = _impacts(xp, system, log, sizes[0])
+    return Parts(impacts, _contacts(xp, time, kept, count, sizes[1]), steps, switches)
 
+
+def _surfaces(system, t0, state) -> int:
+    """Return the number of switching surfaces of a system."""
+    if not isinstance(system, SwitchedSystem):
+        return 0
+    made = jax.eval_shape(lambda t, x: surfaces(system, t, x), t0, state)
+    return made.shape[0]
+
+
+def _nothing(xp: ModuleType, state, log: Log) -> tuple[Impacts, Contacts]:
+    """Return the impacts and contacts of a system without constraints: none."""
+    none = xp.zeros((0,))
+    states = xp.zeros((0, state.shape[0]))
+    which = xp.zeros((0,), dtype=xp.int32)
+    count = xp.sum(log.kind < 0)
+    impacts = Impacts(none, states, states, which, none, none, count)
+    return impacts, Contacts(none, none, none > 0, which, count)
+
+
+def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
+    """Return the crossings of switching surfaces, of which the first has number `m`."""
+    crossed = rows_of_kind(log, RowKind.SWITCH)
+    number = xp.sum(crossed)
+    index = _places(xp, crossed, size, 0)
+    real = xp.arange(size) < number
+    which = xp.where(real, log.constraint[index] - m, 0.0).astype(xp.int32)
+    negative = xp.take_along_axis(log.mode[index], m + which[:, None], axis=1)[:, 0]
+    return Switches(
+        xp.where(real, log.t[index], xp.inf),
+        xp.where(real[:, None], log.before[index], xp.nan),
+        xp.where(real[:, None], log.after[index], xp.nan),
+        which,
+        xp.where(real, xp.where(negative > 0.5, -1.0, 1.0), xp.nan),
+        number,
+    )
+
+
+def _impacts(xp: ModuleType, system, log: Log, max_impacts: int) -> Impacts:
     hits = rows_of_kind(log, RowKind.IMPACT, RowKind.LAST_IMPACT)
     number = xp.sum(hits)
     index = _places(xp, hits, max_impacts, 0)
@@ -59,8 +108,11 @@ def assemble(
     sides = log.before[index], log.after[index]
     speeds = _speeds(xp, system, log.t[index], sides, which)
     hit, left = (xp.where(real, speed, xp.nan) for speed in speeds)
-    impacts = Impacts(t_hit, before, after, which, hit, left, number)
+    return Impacts(t_hit, before, after, which, hit, left, number)
 
+
+def _contacts(xp: ModuleType, time, kept, count, max_contacts: int) -> Contacts:
+    rows = time.shape[0] - 1
     # a contact begins in the row after its last impact and ends where its flag is
     # cleared
     began = xp.concatenate([kept[:1], kept[1:] & ~kept[:-1]])
@@ -76,14 +128,13 @@ def assemble(
     total = xp.sum(began & (starts[:, None] < xp.inf))
     real = xp.arange(max_contacts) < total
     end = ends[row, column]
-    contacts = Contacts(
+    return Contacts(
         xp.where(real, starts[row], xp.inf),
         xp.where(real, xp.minimum(end, reached), xp.inf),
         real & (end < xp.inf),
         xp.where(real, column, 0).astype(xp.int32),
         total,
     )
-    return Parts(impacts, contacts, steps)
 
 
 def _places(xp: ModuleType, mask, size: int, fill: int):

@@ -73,6 +73,45 @@ class Contacts(Printed):
         return ShortTable(f"contacts: {len(rows)}", headings, rows)
 
 
+class Switches(Printed):
+    """The crossings of switching surfaces, in order; padded as `Impacts` is."""
+
+    time: Float[AnyArray, " k"]
+    """Time of each crossing (s), shape `(k,)`."""
+    before: Float[AnyArray, "k n"]
+    """State just before each crossing, shape `(k, n)`."""
+    after: Float[AnyArray, "k n"]
+    """State just after it, different only where the surface has a `reset`, shape
+    `(k, n)`."""
+    surface: Int[AnyArray, " k"]
+    """Index of the surface, shape `(k,)`."""
+    direction: Float[AnyArray, " k"]
+    """+1 where the switching function rises through the switch, -1 where it falls,
+    shape `(k,)`."""
+    count: Int[AnyArray | np.integer, ""]
+    """Number of crossings."""
+
+    def _batched(self) -> bool:
+        return np.ndim(self.count) > 0
+
+    def _table(self) -> ShortTable:
+        columns = (self.time, self.surface, self.direction, self.after)
+        rows = [
+            (
+                str(k + 1),
+                f"{t:.8g}",
+                str(which),
+                "rising" if direction > 0 else "falling",
+                vector_text(state),
+            )
+            for k, (t, which, direction, state) in enumerate(
+                zip(*(numbers(one, self.count) for one in columns), strict=True)
+            )
+        ]
+        headings = ("switch", "time (s)", "surface", "direction", "state")
+        return ShortTable(f"switches: {len(rows)}", headings, rows)
+
+
 class Steps(Printed):
     """The integration points, with the modes of the motion."""
 
@@ -85,6 +124,9 @@ class Steps(Printed):
     `(s, constraints)`."""
     count: Int[AnyArray | np.integer, ""]
     """Number of points."""
+    sides: Float[AnyArray, "s surfaces"] | None = None
+    """Sides of the switching surfaces from this point on, +1 or -1, shape
+    `(s, surfaces)`; `None` without surfaces."""
 
     def _batched(self) -> bool:
         return np.ndim(self.count) > 0

@@ -31,6 +31,7 @@ def padded(steps: Steps) -> Steps:
         pad(steps.state, np.nan),
         pad(steps.contact, False),
         steps.count,
+        None if steps.sides is None else pad(steps.sides, 1.0),
     )
 
 
@@ -48,7 +49,9 @@ def sample(system, settings: Settings, steps: Steps, times):
         found = jnp.searchsorted(steps.time, t, side="right").astype(jnp.int64) - 1
         k = jnp.clip(found, 0, steps.count.astype(jnp.int64) - 1)
         x = tuple(steps.state[k, i] for i in range(n))
-        contact = tuple(steps.contact[k, i] for i in range(functions.m))
+        mode = tuple(steps.contact[k, i] for i in range(functions.m))
+        if steps.sides is not None:
+            mode = mode + tuple(steps.sides[k, i] < 0 for i in range(functions.k))
         start = steps.time[k]
         end = steps.time[jnp.minimum(k + 1, steps.count.astype(jnp.int64) - 1)]
         span = last - steps.time[0]
@@ -57,7 +60,7 @@ def sample(system, settings: Settings, steps: Steps, times):
             # no step extends across a breakpoint, so no sample of a step does
             return s if system.breakpoints is None else between(s, start, end, span)
 
-        point = start, x, contact, t - start
+        point = start, x, mode, t - start
         moved = advance(system, functions, settings, scale, *point, inside)
         # NaN beyond the interval of the run
         room = 1e-12 * jnp.maximum(jnp.abs(steps.time[0]), jnp.abs(last))
@@ -68,30 +71,32 @@ def sample(system, settings: Settings, steps: Steps, times):
 
 
 def advance(
-    system, functions: Functions, settings: Settings, scale, t, x, contact, h, inside
+    system, functions: Functions, settings: Settings, scale, t, x, mode, h, inside
 ):
     """Return the state a time `h` after `(t, x)` in one mode, by one step.
 
     Functions are evaluated at `inside(time)`; errors are relative to `scale`, `(n,)`.
     """
-    moved = _move(system, functions, settings, scale, t, x, contact, h, inside)
-    held = contact[0]
-    for c in contact[1:]:
+    moved = _move(system, functions, settings, scale, t, x, mode, h, inside)
+    if not functions.m:
+        return moved
+    held = mode[0]
+    for c in mode[1 : functions.m]:
         held = held | c
     if functions.planar:
         moved = tuple(jnp.where(held, a, b) for a, b in zip(x, moved, strict=True))
 
     def newton(_, point):
         end = inside(t + h)
-        jets = functions.jets(end, point, contact)
-        return functions.onto(functions.frame(end, point), jets, point, contact)
+        jets = functions.jets(end, point, mode)
+        return functions.onto(functions.frame(end, point, mode), jets, point, mode)
 
     return jax.lax.fori_loop(0, 3, newton, moved)
 
 
-def _move(system, functions, settings, scale, t, x, contact, h, inside):
+def _move(system, functions, settings, scale, t, x, mode, h, inside):
     if isinstance(settings.solver, diffrax.AbstractImplicitSolver):
-        held = jnp.stack(contact)
+        held = jnp.stack(mode[: functions.m])
 
         def field(s, y):
             return field_in_force(system, inside(s), y, held)
@@ -102,6 +107,6 @@ def _move(system, functions, settings, scale, t, x, contact, h, inside):
     tableau = tableau_of(settings.solver)
 
     def along(s, y):
-        return functions.field(inside(s), y, contact)
+        return functions.field(inside(s), y, mode)
 
     return step(tableau, along, t, x, h)[0]

@@ -12,7 +12,7 @@ from .._system import HybridSystem
 from ..checks import is_traced, is_tracing, refuse_tracers
 from ..codes import message
 from ..surface import gaps
-from ._events import Contacts, Impacts, Steps
+from ._events import Contacts, Impacts, Steps, Switches
 from ._printed import Printed
 from ._sample import pad, padded, sample
 from ._section import crossings
@@ -44,6 +44,8 @@ class Trajectory(Printed):
     """The integration points."""
     code: Int[Array, ""]
     """Index into `RESULTS`: 0 if the run reached t1."""
+    switches: Switches | None = None
+    """The crossings of switching surfaces; `None` for a system without any."""
 
     def _batched(self) -> bool:
         return np.ndim(self.code) > 0
@@ -54,6 +56,8 @@ class Trajectory(Printed):
             f"{type(self.system).__name__} from {float(self.t0):g} to {end:g} s, "
             f"impacts: {int(self.impacts.count)}, contacts: {int(self.contacts.count)}"
         )
+        if self.switches is not None:
+            said = f"{said}, switches: {int(self.switches.count)}"
         said = f"{said}. {self.result}" if self.result else said
         return ShortTable(said, (), ())
 

@@ -41,3 +41,10 @@ from ._rounding import (
     speed_rounding as speed_rounding,
     start_room as start_room,
 )
+from ._switches import (
+    OnSides as OnSides,
+    resets as resets,
+    surfaces as surfaces,
+    switched_jet as switched_jet,
+    switched_rounding as switched_rounding,
+)

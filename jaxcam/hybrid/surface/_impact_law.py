@@ -44,7 +44,7 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
         wanted = -jnp.where(size == 0, 1.0, size)
         y = y + (wanted - value) * slope / jnp.sum(slope * slope)
         found.append(-speed(impacts(system, t, y)[k]) / speed(y))
-    return jnp.stack(found)
+    return jnp.stack(found) if found else jnp.zeros((0,))
 
 
 def check_restitution(system: HybridSystem, values) -> None:

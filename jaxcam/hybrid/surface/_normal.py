@@ -162,6 +162,8 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
     """
     gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     number = gradient.shape[0]
+    if not number:
+        return gradient
     rows = []
     for k in range(number):
         _, moved = jax.jvp(
@@ -206,6 +208,8 @@ def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
         >>> field_in_force(ball, 0.0, jnp.zeros(2), held).tolist()
         [0.0, 0.0]
     """
+    if not contact.shape[0]:
+        return system.vector_field(t, x)
     multipliers = contact_multipliers(system, t, x, contact)
     directions = normal_directions(system, t, x)
     push = jnp.sum(multipliers[:, None] * directions, axis=0)
@@ -267,6 +271,8 @@ def mode_jet(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, "m 4"]:
     For a constraint in contact, a and j are the multiplier q and its rate; the zero of
     q is the release.
     """
+    if not contact.shape[0]:
+        return jnp.zeros((0, 4))
 
     def field(s, y):
         return field_in_force(system, s, y, contact)

@@ -17,14 +17,14 @@ def gap_rounding(
     system: HybridSystem, t: RealScalar, x: State, reach: State
 ) -> Float[Array, " m"]:
     """Return the rounding error of each gap, for components as large as `reach`."""
-    return _rounding(lambda s, y: gaps(system, s, y), t, x, reach)
+    return rounding_of(lambda s, y: gaps(system, s, y), t, x, reach)
 
 
 def speed_rounding(
     system: HybridSystem, t: RealScalar, x: State, reach: State
 ) -> Float[Array, " m"]:
     """Return the rounding error of each normal velocity."""
-    return _rounding(lambda s, y: normal_velocity(system, s, y), t, x, reach)
+    return rounding_of(lambda s, y: normal_velocity(system, s, y), t, x, reach)
 
 
 def start_room(rounding, acceleration, time):
@@ -55,7 +55,7 @@ def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
     return gaps(system, t, x) + room * start_room(rounding, acceleration, time)
 
 
-def _rounding(function: Callable, t, x, reach):
+def rounding_of(function: Callable, t, x, reach):
     """Return how far rounding of `t` and `x` moves a function.
 
     State components are accurate to a few parts in 1e15; a time, and a phase computed

@@ -1,0 +1,180 @@
+"""Find corners and jumps in the functions of a system, by reading their programs."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, no_type_check
+
+import jax
+import jax.numpy as jnp
+from jax.extend.core import ClosedJaxpr, Jaxpr, Literal
+
+from ..parameters import as_arrays, real_array, VectorLike
+from ._switched import SwitchedSystem
+from ._system import HybridSystem
+from .surface import OnSides
+
+
+# operations with a corner or a jump in their arguments, as a user calls them
+_CORNERS = {
+    "abs": "abs",
+    "argmax": "argmax",
+    "argmin": "argmin",
+    "ceil": "ceil",
+    "clamp": "clip",
+    "cond": "cond",
+    "floor": "floor",
+    "max": "maximum",
+    "min": "minimum",
+    "reduce_max": "max",
+    "reduce_min": "min",
+    "rem": "remainder",
+    "round": "round",
+    "sign": "sign",
+    "sort": "sort",
+    "while": "while_loop",
+}
+# compiled functions of `jax.numpy`: their lines are those of the call
+_NUMPY = {
+    "_where": "where",
+    "clip": "clip",
+    "divmod": "divmod",
+    "floor_divide": "floor_divide",
+    "fmod": "fmod",
+    "remainder": "remainder",
+    "round": "round",
+    "trunc": "trunc",
+}
+# folders whose lines are not the user's
+_LIBRARIES = tuple(f"/site-packages/{name}/" for name in ("jax", "jaxlib", "equinox"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Corner:
+    """A place where a function of a system is not smooth in time or state."""
+
+    function: str
+    """Method of the system: `"vector_field"` (or `"branch"`), `"gap"`, ..."""
+    operation: str
+    """The operation with a corner or a jump, such as `"abs"` or `"where"`."""
+    file: str
+    """File of the source, or the empty string if unknown."""
+    line: int
+    """Line in the file, from 1; 0 if unknown."""
+
+    def __str__(self) -> str:
+        place = f"{Path(self.file).name}:{self.line}: " if self.line else ""
+        return (
+            f"{place}`{self.operation}` in `{self.function}` has a corner or a jump "
+            "that depends on time or state; define it as a switching surface of a "
+            "jaxcam.hybrid.SwitchedSystem, or, at fixed times, as a breakpoint"
+        )
+
+
+def corners(system: HybridSystem, state: VectorLike) -> list[Corner]:
+    """Return the places where the functions of a system are not smooth.
+
+    The functions are traced, not evaluated: `abs`, `sign`, `where`, `maximum`,
+    `minimum`, `clip`, `floor`, `remainder` and the like are found if what they are
+    applied to, or the condition of a `where`, depends on time or state, wherever the
+    corner is. A motion steps across such a place with shortened steps and a larger
+    error; a [`jaxcam.hybrid.SwitchedSystem`][] locates it. A `where` that only avoids
+    a division by zero is reported as well.
+
+    Args:
+        system: The system.
+        state: Any state, shape `(n,)`, for its number of components.
+
+    Returns:
+        A list of `Corner`, each of which prints as a sentence; empty for smooth
+            functions.
+
+    Examples:
+        >>> from jaxcam.hybrid import corners
+        >>> class Absolute(jaxcam.models.BouncingBall):
+        ...     def vector_field(self, t, state):
+        ...         return jnp.stack([state[1], -9.81 - jnp.abs(state[1])])
+        >>> [corner.operation for corner in corners(Absolute(), [1.0, 0.0])]
+        ['abs']
+    """
+    system, state = as_arrays(system), real_array(state)
+    functions: dict[str, Callable] = {}
+    if isinstance(system, SwitchedSystem):
+        values = jnp.atleast_1d(system.switching(jnp.zeros(()), state))
+        mode = OnSides(system, jnp.zeros(values.shape, dtype=bool))
+        functions["branch"] = mode.vector_field
+        functions["switching"] = system.switching
+        functions["reset"] = lambda t, x: system.reset(t, x, mode.signs)
+    else:
+        functions["vector_field"] = system.vector_field
+    functions |= {"gap": system.gap, "impact": system.impact}
+    found: dict[Corner, None] = {}
+    for name, function in functions.items():
+        closed = jax.make_jaxpr(function)(jnp.zeros(()), state)
+        seen = _corners_in(closed.jaxpr, [True, True], None)
+        found |= {Corner(name, operation, *place): None for operation, place in seen}
+    return list(found)
+
+
+@no_type_check
+def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
+    """Yield operations with a corner and their places.
+
+    **Arguments:** the program; which of its arguments depend on time or state; and, for
+    what lies inside a function of `jax.numpy`, the name and place of its call.
+
+    Returns which of the results depend on time or state.
+    """
+    depends = {id(v) for v, moves in zip(jaxpr.invars, known, strict=True) if moves}
+    for equation in jaxpr.eqns:
+        moves = [
+            not isinstance(v, Literal) and id(v) in depends for v in equation.invars
+        ]
+        if not any(moves):
+            continue
+        name = equation.primitive.name
+        place = where or (None, _place(equation))
+        if _is_corner(equation, name, moves):
+            yield place[0] or _CORNERS.get(name, "where"), place[1]
+        inside = _inside(equation)
+        if inside is not None and len(inside.invars) == len(moves):
+            called = _NUMPY.get(equation.params.get("name"))
+            inner = (called, place[1]) if called and where is None else where
+            yield from _corners_in(inside, moves, inner)
+        depends |= {id(v) for v in equation.outvars}
+
+
+@no_type_check
+def _is_corner(equation, name, moves) -> bool:
+    if name == "select_n":
+        return moves[0]
+    if name == "cond":
+        return moves[0]
+    if name == "convert_element_type":
+        # a condition used as a number
+        return equation.invars[0].aval.dtype == bool
+    if name in ("max", "min", "abs", "sign", "sort"):
+        return jnp.issubdtype(equation.outvars[0].aval.dtype, jnp.inexact)
+    return name in _CORNERS
+
+
+@no_type_check
+def _inside(equation):
+    """Return the program that an equation calls, or `None`."""
+    for key in ("jaxpr", "call_jaxpr", "fun_jaxpr"):
+        inner = equation.params.get(key)
+        if isinstance(inner, ClosedJaxpr):
+            return inner.jaxpr
+        if isinstance(inner, Jaxpr):
+            return inner
+    return None
+
+
+def _place(equation: Any) -> tuple[str, int]:
+    """Return file and line of the innermost call that is not inside a library."""
+    trace = equation.source_info.traceback
+    for frame in trace.frames if trace is not None else ():
+        name = frame.file_name.replace("\\", "/")
+        if not any(library in name for library in _LIBRARIES):
+            return frame.file_name, frame.line_num
+    return "", 0

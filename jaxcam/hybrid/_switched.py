@@ -1,0 +1,139 @@
+"""Define a system whose vector field has several branches, joined at surfaces."""
+
+import abc
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._system import HybridSystem
+from ._types import RealScalar, State
+
+
+class SwitchedSystem(HybridSystem):
+    """A system whose vector field switches where it crosses a surface.
+
+    Subclass it and define two methods. `switching` returns one function per switching
+    surface, which is zero on it; `branch` returns the rates of the state for given
+    sides of the surfaces, +1 where the function is positive and -1 where it is
+    negative. Each branch is smooth, also beyond the surfaces. The event loop locates
+    a crossing as exactly as an impact, ends the step there and goes on with the other
+    branch, so that a stiffness with a corner, backlash or a relay costs no accuracy and
+    crossings have exact derivatives.
+
+    There are no constraints by default; define `gap` and `impact` if the system has
+    impacts, too. `hysteresis` makes a relay of a surface, and `reset` a jump of the
+    state. A motion that both branches drive into the surface would slide along it:
+    the run ends there with the result `RESULTS.slides`, and
+    [`jaxcam.filippov.FilippovSystem`][] is for such systems.
+
+    Examples:
+        >>> from jaxcam.hybrid import SwitchedSystem
+        >>> class SoftStop(SwitchedSystem):
+        ...     stiffness: float = 9.0
+        ...     def switching(self, t, state):
+        ...         return state[0]
+        ...     def branch(self, t, state, sides):
+        ...         spring = jnp.where(sides[0] > 0, self.stiffness, 1.0)
+        ...         return jnp.stack([state[1], -spring * state[0]])
+        >>> run = jaxcam.simulate(SoftStop(), [0.0, 1.0], 0.0, 2.0)
+        >>> np.asarray(run.switches.time).round(6).tolist()
+        [1.047198]
+    """
+
+    surface_names: ClassVar[tuple[str, ...]] = ()
+    """Names of the switching surfaces, in the order of `switching`."""
+
+    @abc.abstractmethod
+    def switching(
+        self, t: RealScalar, state: Float[Array, " n"]
+    ) -> Float[Array, "*surfaces"]:
+        """Return the switching functions, which are zero on the surfaces.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            A scalar, or shape `(k,)` for k surfaces; smooth in time and state.
+        """
+
+    @abc.abstractmethod
+    def branch(
+        self, t: RealScalar, state: Float[Array, " n"], sides: Float[Array, " k"]
+    ) -> Float[Array, " n"]:
+        """Return the rate of change of the state on the given sides of the surfaces.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`; possibly a little beyond a surface.
+            sides: +1 or -1 for each surface, shape `(k,)`. Use them instead of the sign
+                of the switching functions, as in `jnp.where(sides[0] > 0, ...)`.
+
+        Returns:
+            Rates per second, shape `(n,)`; smooth in time and state for fixed sides.
+        """
+
+    def vector_field(self, t: RealScalar, state: State) -> State:
+        """Return the rate of change on the sides that `sides` gives for this state."""
+        return self.branch(t, state, self.sides(t, state))
+
+    def gap(self, t: RealScalar, state: State) -> Float[Array, "*constraints"]:
+        """Return the gaps: none by default, shape `(0,)`."""
+        del t, state
+        return jnp.zeros((0,))
+
+    def impact(self, t: RealScalar, state: State) -> Float[Array, "*constraints n"]:
+        """Return the states after impacts: none by default, shape `(0, n)`."""
+        del t
+        return jnp.zeros((0, state.shape[0]))
+
+    def sides(self, t: RealScalar, state: State) -> Float[Array, " k"]:
+        """Return the sides on which a motion from this state starts.
+
+        By default the signs of the switching functions. A start on a surface takes the
+        side that the motion enters. With hysteresis the state may allow both: override
+        this, for example with a field of the system.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+
+        Returns:
+            +1 or -1 for each surface, shape `(k,)`.
+        """
+        values = jnp.atleast_1d(self.switching(t, state))
+        return jnp.where(values >= 0, 1.0, -1.0)
+
+    @property
+    def hysteresis(self) -> Any:
+        """Return how far beyond zero a switching function passes before it switches.
+
+        A number, or shape `(k,)`; zero by default. A motion on the positive side
+        switches where the function falls to -hysteresis, one on the negative side where
+        it rises to +hysteresis, as a relay does.
+        """
+        return 0.0
+
+    def reset(
+        self, t: RealScalar, state: State, sides: Float[Array, " k"]
+    ) -> Float[Array, "*surfaces n"]:
+        """Return the state just after the crossing of each surface, by default the same.
+
+        Args:
+            t: Time (s).
+            state: State at the crossing, shape `(n,)`.
+            sides: Sides before the crossing, shape `(k,)`.
+
+        Returns:
+            Shape `(n,)` for a scalar `switching`, otherwise `(k, n)`, one row per
+                surface.
+        """
+        del sides
+        shape = jnp.shape(self.switching(t, state))
+        return jnp.broadcast_to(state, (*shape, *state.shape))
+
+    def surface_name(self, number: int) -> str:
+        """Return the name of a surface, by default `surface 1` and so on."""
+        names = self.surface_names
+        return names[number] if number < len(names) else f"surface {number}"

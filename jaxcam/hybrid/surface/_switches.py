@@ -1,0 +1,107 @@
+"""Derive the motion relative to switching surfaces.
+
+The distance of a surface is its switching function on the side of the motion, plus its
+hysteresis: positive before a crossing, zero at it, as a gap is at an impact.
+"""
+
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from .._switched import SwitchedSystem
+from .._system import HybridSystem
+from .._types import RealScalar, State
+from ._normal import field_in_force, lie_series, mode_jet
+from ._rounding import gap_rounding, rounding_of
+
+
+class OnSides(HybridSystem):
+    """A switched system on fixed sides of its surfaces: one branch of its field."""
+
+    system: SwitchedSystem
+    """The system."""
+    negative: Bool[Array, " k"]
+    """Whether the motion is on the negative side of each surface, shape `(k,)`."""
+
+    def vector_field(self, t: RealScalar, state: State) -> State:
+        """Return the rates of the branch."""
+        return self.system.branch(t, state, self.signs)
+
+    def gap(self, t: RealScalar, state: State) -> Float[Array, "*constraints"]:
+        """Return the gaps of the system."""
+        return self.system.gap(t, state)
+
+    def impact(self, t: RealScalar, state: State) -> Float[Array, "*constraints n"]:
+        """Return the states after impacts of the system."""
+        return self.system.impact(t, state)
+
+    @property
+    def period(self) -> Any:
+        """Return the period of the system."""
+        return self.system.period
+
+    @property
+    def breakpoints(self) -> Any:
+        """Return the breakpoints of the system."""
+        return self.system.breakpoints
+
+    @property
+    def signs(self) -> Float[Array, " k"]:
+        """The sides, +1 or -1, shape `(k,)`."""
+        return jnp.where(self.negative, -1.0, 1.0)
+
+
+def surfaces(system: HybridSystem, t, x) -> Float[Array, " k"]:
+    """Return all switching functions as a vector, empty for a system without any.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`.
+
+    Returns:
+        Values, shape `(k,)`.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import surfaces
+        >>> from jaxcam.models import BouncingBall
+        >>> surfaces(BouncingBall(), 0.0, jnp.array([1.0, 0.0])).shape
+        (0,)
+    """
+    if not isinstance(system, SwitchedSystem):
+        return jnp.zeros((0,))
+    return jnp.atleast_1d(system.switching(t, x))
+
+
+def distances(mode: OnSides, t, x) -> Float[Array, " k"]:
+    """Return the distance of each surface, zero at a crossing, shape `(k,)`."""
+    return mode.signs * surfaces(mode.system, t, x) + mode.system.hysteresis
+
+
+def resets(mode: OnSides, t, x) -> Float[Array, "k n"]:
+    """Return the state after the crossing of each surface, one row for each."""
+    return jnp.atleast_2d(mode.system.reset(t, x, mode.signs))
+
+
+def switched_jet(mode: OnSides, t, x, contact: Bool[Array, " m"]):
+    """Return distance and three rates of each constraint, then of each surface.
+
+    Shape `(m + k, 4)`; for a constraint in contact as `mode_jet`.
+    """
+
+    def field(s, y):
+        return field_in_force(mode, s, y, contact)
+
+    along = lie_series(lambda s, y: distances(mode, s, y), field, 3)(t, x)
+    own = jnp.stack(along, axis=1)
+    if not contact.shape[0]:
+        return own
+    return jnp.concatenate([mode_jet(mode, t, x, contact), own])
+
+
+def switched_rounding(mode: OnSides, t, x, reach: State):
+    """Return the rounding errors of the gaps, then of the distances of surfaces."""
+    own = rounding_of(lambda s, y: distances(mode, s, y), t, x, reach)
+    gaps = gap_rounding(mode, t, x, reach)
+    return jnp.concatenate([gaps, own]) if gaps.shape[0] else own
