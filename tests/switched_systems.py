@@ -105,8 +105,10 @@ def integrated(system: Affine, state, t1):
 
 
 def bilinear_motion(system: BilinearOscillator, state, t1):
-    """Crossings and final state of a bilinear oscillator by exponentials of matrices."""
-    zeta, k, stop = (float(getattr(system, n)) for n in ("damping", "stiffness", "stop"))
+    """Crossings and final state of a bilinear oscillator, by matrix exponentials."""
+    zeta, k, stop = (
+        float(getattr(system, n)) for n in ("damping", "stiffness", "stop")
+    )
     force, omega = float(system.amplitude), float(system.omega)
     matrices = {}
     for side, stiffness, shift in ((1, k, (k - 1) * stop), (-1, 1.0, 0.0)):

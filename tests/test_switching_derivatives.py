@@ -4,11 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.linalg import expm
+from switched_systems import Affine, random_affine
 
 import jaxcam
 import variational
 from jaxcam.hybrid import flow, Settings
-from switched_systems import Affine, random_affine
 from variational import switching_saltation
 
 
@@ -51,7 +51,9 @@ def test_flow_has_the_saltation_matrix_of_each_crossing():
         width = 0.1 * (found % 2)
         system = random_affine(rng, jump=0.3, width=width)
         state = jnp.asarray(rng.normal(size=3))
-        if not bool(jaxcam.simulate(system, state, 0.0, END, settings=SHARP).successful):
+        if not bool(
+            jaxcam.simulate(system, state, 0.0, END, settings=SHARP).successful
+        ):
             continue
         product, count = _product(system, state)
         by_system, by_state = _slopes(system, state)
@@ -74,11 +76,11 @@ def _compare(system, state, by_system, by_state):
         found = difference(
             (system, state + step * units[i]), (system, state - step * units[i])
         )
-        assert np.max(np.abs(found - by_state[:, i])) < 1e-6 * (1 + np.max(np.abs(found)))
+        assert np.max(np.abs(found - by_state[:, i])) < 1e-6 * (
+            1 + np.max(np.abs(found))
+        )
     for i in range(2):
-        moved = [
-            Affine(*(_at_level(system, i, s * step))) for s in (1.0, -1.0)
-        ]
+        moved = [Affine(*(_at_level(system, i, s * step))) for s in (1.0, -1.0)]
         found = difference((moved[0], state), (moved[1], state))
         slope = by_system.levels[:, i]
         assert np.max(np.abs(found - slope)) < 1e-6 * (1 + np.max(np.abs(found)))
@@ -90,8 +92,8 @@ def _at_level(system, i, by):
 
 
 def test_what_knows_no_surfaces_says_so():
-    from jaxcam.models import BilinearOscillator
     import continuation
+    from jaxcam.models import BilinearOscillator
 
     system = BilinearOscillator(amplitude=0.5, damping=0.1)
     for function in (

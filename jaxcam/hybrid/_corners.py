@@ -125,9 +125,7 @@ def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
 
     Returns which of the results depend on time or state.
     """
-    depends = {
-        id(v) for v, moves in zip(jaxpr.invars, known, strict=True) if moves
-    }
+    depends = {id(v) for v, moves in zip(jaxpr.invars, known, strict=True) if moves}
     for equation in jaxpr.eqns:
         moves = [
             not isinstance(v, Literal) and id(v) in depends for v in equation.invars

@@ -49,9 +49,11 @@ class Functions:
 
     The discrete `mode` is a tuple of flags: whether each of the `m` constraints is in
     contact, then whether the motion is on the negative side of each of the `k`
-    switching surfaces. Without surfaces most functions do not depend on it. `planar` systems have two states and one constraint: gap and normal velocity fix
-    the state during contact, which then needs no integration. `plain` functions are
-    called unchanged, on arrays.
+    switching surfaces. Without surfaces most functions do not depend on it.
+
+    `planar` systems have two states, one constraint and no surface: gap and normal
+    velocity fix the state during contact, which then needs no integration. `plain`
+    functions are called unchanged, on arrays.
     """
 
     def __init__(self, system: HybridSystem, n: int, plain: bool = False):
