@@ -26,6 +26,7 @@ _TOPICS: dict[str, tuple[str, ...]] = {
     "lyapunov": ("benettin1980",),
     "normal forms": ("kuznetsov2004",),
     "period doubling": ("feigenbaum1978",),
+    "piecewise linear": ("shaw1983", "kahraman1990"),
     "root finding": ("rader2024",),
     "saltation": ("leine2004", "dibernardo2008", "kong2024"),
     "special points": ("govaerts2000", "kuznetsov2004"),

@@ -105,7 +105,7 @@ def integrated(system: Affine, state, t1):
 
 
 def bilinear_motion(system: BilinearOscillator, state, t1):
-    """Crossings and final state of a bilinear oscillator by exponentials of matrices."""
+    """Crossings and final state of a bilinear oscillator, by matrix exponentials."""
     zeta, k, stop = (
         float(getattr(system, n)) for n in ("damping", "stiffness", "stop")
     )

@@ -4,11 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.linalg import expm
+from switched_systems import Affine, random_affine
 
 import jaxcam
 import variational
 from jaxcam.hybrid import flow, Settings
-from switched_systems import Affine, random_affine
 from variational import switching_saltation
 
 
@@ -92,8 +92,8 @@ def _at_level(system, i, by):
 
 
 def test_what_knows_no_surfaces_says_so():
-    from jaxcam.models import BilinearOscillator
     import continuation
+    from jaxcam.models import BilinearOscillator
 
     system = BilinearOscillator(amplitude=0.5, damping=0.1)
     for function in (

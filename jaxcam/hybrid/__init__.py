@@ -13,4 +13,4 @@ from ._stroboscope import stroboscope as stroboscope
 from ._switched import SwitchedSystem as SwitchedSystem
 from ._system import HybridSystem as HybridSystem
 from .codes import RESULTS as RESULTS
-from .record import Switches as Switches, Trajectory as Trajectory
+from .record import Trajectory as Trajectory

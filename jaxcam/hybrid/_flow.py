@@ -115,9 +115,10 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     start = (jnp.asarray(0, jnp.int32), (carried, kept))
     loop = functools.partial(jax.lax.while_loop, unfinished, several)
     _, (carried, kept) = one_kernel(loop, on=not settings.plain)(start)
+    contact = jnp.stack(carried.mode)
     return Arrival(
         state=jnp.stack(carried.x),
-        contact=jnp.stack(carried.mode)[: functions.m],
+        contact=contact[: functions.m] if functions.k else contact,
         impacts=carried.impacts,
         steps=depend_on(carried.steps, kept),
         code=carried.status.astype(jnp.int32),

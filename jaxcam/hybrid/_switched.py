@@ -118,7 +118,8 @@ class SwitchedSystem(HybridSystem):
     def reset(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]
     ) -> Float[Array, "*surfaces n"]:
-        """Return the state just after the crossing of each surface, by default the same.
+        """Return the state just after the crossing of each surface: unchanged by
+        default.
 
         Args:
             t: Time (s).

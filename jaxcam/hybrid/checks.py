@@ -192,8 +192,8 @@ def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
     if after.shape != (*switch.shape, n):
         raise ValueError(
             f"reset returns shape {after.shape} but switching has shape {switch.shape} "
-            f"and the state {(n,)}; return shape {(*switch.shape, n)}, one row for each "
-            "surface"
+            f"and the state {(n,)}; return shape {(*switch.shape, n)}, one row for "
+            "each surface"
         )
     if np.shape(system.hysteresis) not in ((), (k,)):
         raise ValueError(

@@ -70,8 +70,8 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     )
     """Impacts on several constraints accumulate together."""
     slides = (
-        "The motion slides along a switching surface, or its crossings accumulate: both "
-        "branches of the vector field point to the surface. State it as a "
+        "The motion slides along a switching surface, or its crossings accumulate: "
+        "both branches of the vector field point to the surface. State it as a "
         "jaxcam.filippov.FilippovSystem, which slides, or give the switch a hysteresis."
     )
     """The motion slides along a switching surface."""

@@ -51,9 +51,9 @@ class Functions:
     contact, then whether the motion is on the negative side of each of the `k`
     switching surfaces. Without surfaces, most functions do not depend on it.
 
-    `planar` systems have two states and one constraint: gap and normal velocity
-    determine the state during contact, which then needs no integration. `plain`
-    functions are called unchanged, with arrays.
+    `planar` systems have two states, one constraint and no surface: gap and normal
+    velocity determine the state during contact, which then needs no integration.
+    `plain` functions are called unchanged, with arrays.
     """
 
     def __init__(self, system: HybridSystem, n: int, plain: bool = False):
@@ -190,7 +190,7 @@ class Functions:
         )
 
     def lift(self, t, x, mode):
-        """Return for each gap the displacement of the state that increases it by one."""
+        """Return, by gap, the displacement of the state that increases it by one."""
         if not self.m:
             return ()
         return tuple(map(tuple, self._lift(t, _pack(x), *self._side(mode))))

@@ -172,24 +172,25 @@ def _judge_flights(
     h, jets = end.length, made.jets
     slack = [2e-12 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
     closed = carried.closed
-    flown = earliest(
-        [
-            _where_in_force(
-                ~closed[k],
-                judge(
-                    carried.jets[k],
-                    jet,
-                    h,
-                    slack[k],
-                    rounding[k],
-                    carried.scale[k],
-                    end.room,
-                    carried.longest,
-                ),
-            )
-            for k, jet in enumerate(jets)
-        ]
-    )
+    verdicts = [
+        _where_in_force(
+            ~closed[k],
+            judge(
+                carried.jets[k],
+                jet,
+                h,
+                slack[k],
+                rounding[k],
+                carried.scale[k],
+                end.room,
+                carried.longest,
+            ),
+        )
+        for k, jet in enumerate(jets)
+    ]
+    if carried.crossed:
+        verdicts = _jumped_across(carried, verdicts, h)
+    flown = earliest(verdicts)
     natural = jnp.minimum(carried.longest, plan.longest_step)
     # the motion suppressed by the multipliers counts as gap, since rounding is relative
     # to it
@@ -207,6 +208,20 @@ def _judge_flights(
     over = waits & (behind < -of_constraint(slack, flown.constraint))
     good = fits & ~flown.retake & ~over & active
     return Judged(flown, lands, good, over, natural, held, tiny)
+
+
+def _jumped_across(carried: LoopState, verdicts: list[StepVerdict], h):
+    """Let a surface be crossed at once where a jump of the state has crossed it."""
+    m = len(carried.held)
+    for k, behind in enumerate(carried.behind, start=m):
+        now, seen = behind & (h == 0), verdicts[k]
+        verdicts[k] = seen._replace(
+            retake=seen.retake & ~now,
+            length=jnp.where(now, jnp.inf, seen.length),
+            lands=seen.lands | now,
+            offset=jnp.where(now, 0.0, seen.offset),
+        )
+    return verdicts
 
 
 def _judge_contacts(

@@ -67,6 +67,13 @@ class LoopState(NamedTuple):
         """For each jet, whether its constraint is in contact; a surface is not."""
         return closed(self.mode, len(self.held))
 
+    @property
+    def behind(self) -> list:
+        """For each switching surface, whether a jump of the state has crossed it."""
+        parts = (self.jets, self.scale, self.blur)
+        rest = (part[len(self.held) :] for part in parts)
+        return [j.gap < -(2e-12 * s + b) for j, s, b in zip(*rest, strict=True)]
+
 
 def closed(mode: tuple, constraints: int) -> tuple:
     """Return the flags of contact, and False for each switching surface."""

@@ -59,6 +59,9 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
             for j, c, near in zip(carried.jets, carried.closed, rounding, strict=True)
         ]
     )
+    if carried.crossed:
+        # nor after a jump of the state across a switching surface
+        now = now | any_of(carried.behind)
     wanted = jnp.where(now, 0.0, jax.lax.stop_gradient(carried.step))
     timed = carried.completing | carried.locating
     at_stop = (carried.t + wanted >= stop) & ~timed
