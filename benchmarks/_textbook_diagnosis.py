@@ -2,6 +2,7 @@
 
 import math
 import time
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -78,7 +79,7 @@ def setup_of(case: Case, noise: float) -> Setup:
         Parameter(name, lambda m, name=name: getattr(m.system, name), tolerance)
         for name, tolerance in tolerances.items()
     )
-    model = Model(system, sensors, Input("input", lambda s: _bare(s).input))
+    model = Model(system, sensors, Input("input", _input))
     return Setup(model, parameters, references={"spring_center": 0.0})
 
 
@@ -112,7 +113,6 @@ class Found:
     def acceleration(self, motion: Motion, textbook: bool) -> np.ndarray:
         """Acceleration along a true motion; an element follows that motion."""
         system = self.model(textbook).system
-        place = self.setup.model.drive.value
         size = len(system.state_names or "xv") - 2
         own = jnp.zeros(max(size, 0))
         step = 1 / self.case.rate
@@ -120,7 +120,7 @@ class Found:
         bends = jnp.asarray(self._bends(motion))
 
         def field(x, level, own):
-            system_now = _with_input(system, place, level)
+            system_now = _with_input(system, level)
             return system_now.vector_field(0.0, jnp.concatenate([x, own]))
 
         def between(one, bend, ahead, next_bend, share):
@@ -169,13 +169,12 @@ class Found:
         model = self.model(textbook)
         if not math.isfinite(self.case.stop):
             return np.asarray(free_run(model, held).simulated["position_m"])
-        place = self.setup.model.drive.value
 
         @jax.jit
         def rates(x, u):
-            return _with_input(model.system, place, u).vector_field(0.0, x)
+            return _with_input(model.system, u).vector_field(0.0, x)
 
-        values = {
+        values: dict[str, Any] = {
             name: float(getattr(_bare(model.system), name))
             for name in ("stop", "restitution")
         }
@@ -188,11 +187,15 @@ class Found:
         )
 
 
-def _bare(system):
+def _bare(system) -> Any:
     while hasattr(system, "base"):
         system = system.base
     return system
 
 
-def _with_input(system, place, level):
-    return eqx.tree_at(place, system, level)
+def _input(system) -> Any:
+    return _bare(system).input
+
+
+def _with_input(system, level):
+    return eqx.tree_at(_input, system, level)

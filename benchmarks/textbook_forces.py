@@ -24,6 +24,7 @@ of the true system.
 import argparse
 import math
 import time
+from typing import Any
 
 import numpy as np
 
@@ -103,7 +104,9 @@ def by_regression(case: Case, learnt, held: Motion, noise: float, args) -> None:
             case, runs, split=split, report=print if args.progress else None
         )
         spent = time.process_time() - spent
-        law = {"stop": case.stop, "restitution": case.restitution} if split else {}
+        law: dict[str, Any] = (
+            {"stop": case.stop, "restitution": case.restitution} if split else {}
+        )
         run = run_freely(found.field, case.rate, held.input, unseen, **law)
         print(f"    {settings}: {found.formula}")
         reported(
