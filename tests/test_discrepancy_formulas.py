@@ -110,6 +110,25 @@ def test_a_form_is_refused_where_its_place_is_outside_the_data():
     assert bump.within((0.3, 0.8, 2.0)) and not bump.within((0.3, 1.4, 2.0))
 
 
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("window", (1.0, 0.7, 0.3)),
+        ("saturating", (1.5, 0.4, -0.1)),
+        ("dead zone", (2.0, 0.9, 0.3)),
+        ("dead zone", (2.0, 0.5, -0.2)),
+        ("curved above", (2.0, 0.5, -0.5)),
+        ("fast", (1.0, 0.7)),
+        ("power of speed", (1.0, -0.5)),
+    ],
+)
+def test_a_form_with_parameters_that_make_no_sense_is_refused(name, numbers):
+    """Edges in the wrong order or outside, negative lengths and exponents."""
+    family = _family(Variable.VELOCITY)
+    form = next(one for one in family.primitives if one.name == name)
+    assert form.within(NUMBERS[name]) and not form.within(numbers)
+
+
 def test_what_falls_from_the_beginning_is_said_to_fall():
     family = _family(Variable.TIME, where=Where.IMPACT)
     power = next(one for one in family.primitives if one.name == "power")
@@ -125,7 +144,8 @@ def test_an_elastic_stop_is_said_to_be_one():
     above = next(one for one in family.primitives if one.name == "above")
     text, words = formula_of(family, above, np.array([-30.0, 0.5]), "force")
     assert text == "-20*max(position - 0.35, 0)"
-    assert "pushes back above 0.35 rad with 20 1/s^2, as an elastic stop would" in words
+    assert "pushes back above 0.35 rad with a stiffness of 20 1/s^2" in words
+    assert "as an elastic stop would" in words
     pulled = formula_of(family, above, np.array([30.0, 0.5]), "force")[1]
     assert "elastic stop" not in pulled and "pulls above 0.35 rad" in pulled
 

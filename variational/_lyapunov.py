@@ -104,15 +104,8 @@ def lyapunov_spectrum(
         >>> found.exponents.shape
         (2,)
     """
-    refuse_tracers(
-        "lyapunov_spectrum",
-        "jax.jacfwd of jaxcam.hybrid.flow",
-        system,
-        state,
-        values,
-        t0,
-        turn,
-    )
+    inputs = system, state, values, t0, turn
+    refuse_tracers("lyapunov_spectrum", "jax.jacfwd of jaxcam.hybrid.flow", *inputs)
     refuse_switched(system, "lyapunov_spectrum")
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()

@@ -222,7 +222,8 @@ def simulated(model: Model, one: Prepared) -> Simulated:
         system = model.driven(t, level, jnp.zeros_like(t))
 
         def advance(x, k):
-            return runge_kutta(model, system, t + k * step, x, step)[0], None
+            at = t + k * step
+            return runge_kutta(model, lambda t: system, at, x, step)[0], None
 
         after, _ = jax.lax.scan(advance, x, jnp.arange(one.steps, dtype=float))
         return after, seen(t, system, x)

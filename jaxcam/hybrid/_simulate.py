@@ -34,6 +34,15 @@ from .segments import simulate_segments
 from .surface import release_point
 
 
+def _check_choices(engine: str, derivatives: str) -> None:
+    if engine not in ("loop", "diffeqsolve"):
+        raise ValueError(f'engine is {engine!r}; choose "loop" or "diffeqsolve"')
+    if derivatives not in ("forward", "reverse"):
+        raise ValueError(
+            f'derivatives is {derivatives!r}; choose "forward" or "reverse"'
+        )
+
+
 def simulate(
     system: HybridSystem,
     state: VectorLike | None,
@@ -88,12 +97,7 @@ def simulate(
         BouncingBall from 0 to 1 s, impacts: 1, contacts: 0
     """
     settings = _chosen(settings, tolerance, solver, max_step)
-    if engine not in ("loop", "diffeqsolve"):
-        raise ValueError(f'engine is {engine!r}; choose "loop" or "diffeqsolve"')
-    if derivatives not in ("forward", "reverse"):
-        raise ValueError(
-            f'derivatives is {derivatives!r}; choose "forward" or "reverse"'
-        )
+    _check_choices(engine, derivatives)
     t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
     system = as_arrays(system)
     settings = as_arrays(settings)

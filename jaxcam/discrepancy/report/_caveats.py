@@ -149,8 +149,8 @@ def decoy_explains(share: float) -> Caveat:
     return Caveat(
         Reason.DECOY,
         "The same function evaluated along the time-reversed motion would explain "
-        f"{share:.0%} of what it explains, so these recordings hardly show on "
-        "which variables it depends. Record motions that repeat less.",
+        f"{share:.0%} of what it explains, so these recordings hardly show when "
+        "the force acts. Record motions that repeat less.",
     )
 
 

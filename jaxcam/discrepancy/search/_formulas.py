@@ -34,7 +34,9 @@ def formulated(
     **Returns:** the fit, and all fits with forms.
     """
     tried: list[Missing] = []
-    for one in found.functions:
+    for slot in [one.slot for one in found.functions]:
+        # a fit of another function may have renewed it
+        one = _in_slot(found, slot)
         if isinstance(one, Hidden) or not one.smooth:
             continue
         trials = []
@@ -45,7 +47,7 @@ def formulated(
             ):
                 break
             progress(f"fitting a formula: {primitive.name}", None)
-            trial = _fitted(fits, found, apart, one, primitive, numbers)
+            trial = _fitted(fits, found, apart, one, primitive, numbers, small)
             trials += [] if trial is None else [trial]
         sound = [trial for trial in trials if _sound(trial, one)]
         tried += sound
@@ -55,9 +57,14 @@ def formulated(
     return found, tried
 
 
+def _in_slot(found: Missing, slot: str):
+    """Return the function of a fit that occupies a slot."""
+    return next(one for one in found.functions if one.slot == slot)
+
+
 def _sound(trial: Missing, one: Free) -> bool:
-    """Return whether a fit with a form converged with its positions within the data."""
-    (form,) = (f for f in trial.functions if f.slot == one.slot)
+    """Return whether a form has finite evidence and parameters that make sense."""
+    form = _in_slot(trial, one.slot)
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
     return math.isfinite(trial.score) and form.primitive.within(numbers)
@@ -88,6 +95,7 @@ def _fitted(
     one: Free,
     primitive: Primitive,
     numbers,
+    small: float,
 ) -> Missing | None:
     """Fit a form in place of a function, starting from given parameters.
 
@@ -96,21 +104,22 @@ def _fitted(
     problem = found.problem
     size = Roughness(size=abs(float(numbers[0])))
     form = dataclasses.replace(one, primitive=primitive, roughness=size)
-    functions = tuple(form if f is one else f for f in found.functions)
+    functions = tuple(form if f.slot == one.slot else f for f in found.functions)
     values = emptied(problem, found.fit.point.values, one.slot)
     columns = [problem.names.index(name) for name in form.coefficients]
     values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
-    beaten = fits.policy.outdone * found.fit.cost
+    beaten = max(fits.policy.outdone * found.fit.cost, found.fit.cost + small)
     if shows_apart(one.family):
         # with disconnected pieces the fit is almost linear
         subset = Subset(apart, functions, found.names)
         first = fits.fitted(subset, point, beaten=beaten)
         if not first.fit.cost < beaten:
             return None
-        point = first.fit.point
+        point, functions = first.fit.point, first.functions
     subset = Subset(problem, functions, found.names)
-    return fits.fitted(subset, point, beaten=beaten)
+    trial = fits.fitted(subset, point, beaten=beaten)
+    return trial if trial.fit.cost < beaten else None
 
 
 def _promising(

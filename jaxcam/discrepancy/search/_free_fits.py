@@ -145,7 +145,7 @@ class FreeFits:
         blocks = blocks_of(bare, point, names=free)
         information, score = unscaled(blocks, one.coefficients, heat)
         for other in subset.functions:
-            if other is not one:
+            if other.slot != one.slot:
                 _known(information, blocks, other)
         return information, score, blocks.rows(free), blocks.rows(one.coefficients)
 

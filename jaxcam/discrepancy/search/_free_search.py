@@ -87,15 +87,21 @@ class FreeSearch:
             return None
         found = self._pruned(found)
         found = simplified(self.fits, self.problem, found, self.progress)
-        found = self._formulated(found)
+        curve, found = found, self._formulated(found)
         if len(found.functions) > 1 or found.names:
             return found
+        # a form may be a little worse than its curve: the better of both counts
+        best = min(curve.score, found.score)
         for lead in self._others():
             if leaves_noise(self.fits, found, self._small(found)):
                 break
-            other = self._rival_function(bare, lead)
-            if other is not None and other.score < found.score:
-                found = other
+            curve = self._rival_function(bare, lead)
+            if curve is None:
+                continue
+            other = self._formulated(curve)
+            score = min(curve.score, other.score)
+            if score < best:
+                found, best = other, score
         return found
 
     def _formulated(self, found: Missing) -> Missing:
@@ -122,8 +128,7 @@ class FreeSearch:
         On single pieces of flight a smooth function may be ahead of the right one.
         """
         self.progress(f"fitting {lead.label} instead", None)
-        trial = self._with(self.problem, bare, lead)
-        return None if trial is None else self._formulated(trial)
+        return self._with(self.problem, bare, lead)
 
     def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
         """Return the labels of functions, and the shares that their decoys gain."""
@@ -293,7 +298,8 @@ class FreeSearch:
 
     def _without(self, found: Missing, out: Part | str) -> tuple[Subset, Point]:
         """Return the subset without a function or a term, and a start for its fit."""
-        functions = tuple(f for f in found.functions if f is not out)
+        slot = "" if isinstance(out, str) else out.slot
+        functions = tuple(f for f in found.functions if f.slot != slot)
         names = found.names - {out} if isinstance(out, str) else found.names
         values = found.fit.point.values
         if not isinstance(out, str):

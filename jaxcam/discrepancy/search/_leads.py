@@ -8,7 +8,7 @@ import numpy as np
 
 from ...fitting import Problem
 from ..policy import Policy
-from ..terms import Family, Variable, Where
+from ..terms import Factor, Family, Variable, Where
 from ._blocks import blocks_of
 from ._free_fits import FreeFits, heat_of, heated, Missing, unscaled
 from ._gains import added_gain
@@ -99,7 +99,8 @@ class Leads:
         ]
         leads.sort(key=lambda lead: -lead.gain)
         for number, lead in enumerate(leads):
-            first = not found.functions and number < self.policy.followed
+            bare = not found.functions and not found.names
+            first = bare and number < self.policy.followed
             yield self._against_decoy(problem, found, lead, response) if first else lead
         if hidden and self.driven is not None:
             self.progress("searching for forces with an internal state", None)
@@ -137,8 +138,10 @@ class Leads:
     ) -> Lead:
         family = lead.family
         assert family is not None
-        # harmonics of a phase remain such harmonics in the reverse order
-        if family.periodic or not lead.gain > 0:
+        # under time reversal, a function of time or of the phase alone remains one
+        alone = family.factor is Factor.ONE
+        clock = family.argument in (Variable.TIME, Variable.PHASE)
+        if (alone and clock) or not lead.gain > 0:
             return lead
         rough = self._force(problem, found, family, response, decoy=True)
         return lead._replace(decoy=max(rough.gain, 0.0) / lead.gain)

@@ -264,11 +264,15 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
         def advance(x, inputs):
             number, a, w = inputs
             t = start + (number + jnp.array([0.0, 0.5, 1.0])) * step
-            system = model.driven(t[1], a, w)
-            middle, _ = runge_kutta(model, system, t[0], x, step / 2)
-            end, _ = runge_kutta(model, system, t[1], middle, step / 2)
+            during = model.during(t[1], a, w)
+            middle, _ = runge_kutta(model, during, t[0], x, step / 2)
+            end, _ = runge_kutta(model, during, t[1], middle, step / 2)
             states = jnp.stack([x, middle, end])[:, :size]
-            return end, jax.vmap(lambda t, x: _slopes(terms, system, t, x))(t, states)
+
+            def slopes(t, x):
+                return _slopes(terms, during(t), t, x)
+
+            return end, jax.vmap(slopes)(t, states)
 
         numbers = jnp.arange(angle.shape[0], dtype=float)
         _, slopes = jax.lax.scan(advance, state, (numbers, angle, rate))

@@ -47,7 +47,9 @@ class Primitive(NamedTuple):
     - `jump`: jump of the form at a change of sign of the velocity, in halves of its
       size.
     - `odd`: whether the form is multiplied by the direction of motion.
-    - `places`: the parameters that are positions, as shares of the range.
+    - `places`: the parameters that are positions, as shares of the range; of two, the
+      first is the lower one. `positive`: those that are lengths or exponents.
+    - `ends`: further positions, as a function of the parameters.
     """
 
     name: str
@@ -57,10 +59,21 @@ class Primitive(NamedTuple):
     jump: float = 0.0
     odd: bool = False
     places: tuple[int, ...] = ()
+    positive: tuple[int, ...] = ()
+    ends: Callable | None = None
 
     def within(self, numbers) -> bool:
-        """Return whether the positions lie in the range of the argument."""
-        return all(0.0 <= float(numbers[k]) <= 1.0 for k in self.places)
+        """Return whether the positions lie in the range of the argument, in their
+        order, and lengths and exponents are positive.
+        """
+        numbers = [float(number) for number in numbers]
+        places = [numbers[k] for k in self.places]
+        every = [*places, *(self.ends(numbers) if self.ends else ())]
+        return (
+            all(0.0 <= place <= 1.0 for place in every)
+            and places == sorted(places)
+            and all(numbers[k] > 0 for k in self.positive)
+        )
 
     @property
     def count(self) -> int:
@@ -158,6 +171,7 @@ CURVED_ABOVE = Primitive(
     (_shares(0.05, 0.9, 35), (1.5, 2.0, 3.0)),
     (0.05, 0.2),
     places=(1,),
+    positive=(2,),
 )
 CURVED_BELOW = Primitive(
     "curved below",
@@ -165,6 +179,7 @@ CURVED_BELOW = Primitive(
     (_shares(0.1, 0.95, 35), (1.5, 2.0, 3.0)),
     (0.05, 0.2),
     places=(1,),
+    positive=(2,),
 )
 DEAD_ZONE = Primitive(
     "dead zone",
@@ -172,6 +187,8 @@ DEAD_ZONE = Primitive(
     (_shares(0.2, 0.8, 25), _shares(0.04, 0.4, 10)),
     (0.05, 0.05),
     places=(1,),
+    positive=(2,),
+    ends=lambda p: (p[1] - p[2], p[1] + p[2]),
 )
 SATURATING = Primitive(
     "saturating",
@@ -179,6 +196,7 @@ SATURATING = Primitive(
     (_INSIDE, (0.05, 0.1, 0.2, 0.4)),
     (0.05, 0.05),
     places=(1,),
+    positive=(2,),
 )
 WAVE = Primitive(
     "wave",
@@ -200,7 +218,8 @@ FAST = Primitive(
     (_shares(0.02, 0.46, 23),),
     (0.05,),
     odd=True,
-    places=(1,),
+    # velocities to either side
+    ends=lambda p: (2 * p[1],),
 )
 POWER_OF_SPEED = Primitive(
     "power of speed",
@@ -208,6 +227,7 @@ POWER_OF_SPEED = Primitive(
     ((0.5, 1.5, 2.0, 3.0, 4.0),),
     (0.2,),
     odd=True,
+    positive=(1,),
 )
 HARMONICS = tuple(
     Primitive(

@@ -122,8 +122,9 @@ class Input(eqx.Module):
     """A measured input, such as a force or a voltage, with the system field for it.
 
     When a recording is predicted, the field follows the input in that recording. Each
-    sample is held until the next (zero-order hold), as in digital controllers, and each
-    integration step uses the mean over the step.
+    sample is held until the next (zero-order hold), as in digital controllers. Within
+    each integration step, the input is linear, with the mean and the first moment of
+    the held samples.
 
     Examples:
         >>> from jaxcam.fitting import Input
@@ -140,6 +141,10 @@ class Input(eqx.Module):
         """Return the system with its input at `level`."""
         del t, rate
         return eqx.tree_at(self.value, system, level)
+
+    def during(self, system, middle, level, rate):
+        """Return the system as a function of time, within a step."""
+        return lambda t: self.at(system, t, level + rate * (t - middle), rate)
 
 
 class Model(eqx.Module):
@@ -165,6 +170,16 @@ class Model(eqx.Module):
         if self.drive is None:
             return self.system
         return self.drive.at(self.system, t, angle, rate)
+
+    def during(self, middle, angle, rate) -> Callable[[Array], HybridSystem]:
+        """Return the system as a function of time, within a step about `middle`.
+
+        A drive turns uniformly within a step, which the system itself expresses.
+        """
+        if isinstance(self.drive, Input):
+            return self.drive.during(self.system, middle, angle, rate)
+        system = self.driven(middle, angle, rate)
+        return lambda t: system
 
 
 def cam_follower_drive() -> Turning:

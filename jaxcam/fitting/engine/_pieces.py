@@ -217,12 +217,10 @@ def gather(
         angle_at, rate_at = _drive(segments, flown.start)
         rest_angle, rest_rate = _drive(segments, nodes)
     else:
-        angle = _mean_input(segments, measured, flown, steps)
+        angle, rate = _input_in_steps(segments, measured, flown, steps)
         angle_at = _input(segments, measured, flown.start)
         rest_angle = _input(segments, measured, nodes)
-        rate, rate_at, rest_rate = (
-            np.zeros(part.shape) for part in (angle, angle_at, rest_angle)
-        )
+        rate_at, rest_rate = np.zeros(angle_at.shape), np.zeros(rest_angle.shape)
     pieces = Pieces(
         flown,
         rested,
@@ -290,16 +288,37 @@ def _input(segments, channel: str, times):
     return found
 
 
-def _mean_input(segments, channel: str, flown: Samples, steps: int):
-    """Return the mean of each recording's input over every step, shape `(r, k, n)`."""
+def _input_in_steps(segments, channel: str, flown: Samples, steps: int):
+    """Return the mean and the slope of each recording's input in every step, `(r, k,
+    n)`.
+
+    A linear input with them has the integral and the first moment of the held samples:
+    a step that contains a jump would otherwise leave an error of position.
+    """
     step = np.asarray(flown.step)[..., None]
     edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
-    found = np.zeros((*flown.start.shape, steps))
+    mean, slope = np.zeros((2, *flown.start.shape, steps))
     for row, part in enumerate(segments):
         time, level = part.recording.time, part.recording[channel]
-        total = np.concatenate([[0.0], np.cumsum(level[:-1] * np.diff(time))])
-        found[row] = np.diff(np.interp(edges[row], time, total)) / step[row]
-    return found
+        first, second = _integrals(time, level, edges[row])
+        h = step[row]
+        mean[row] = np.diff(first) / h
+        # by parts: the moment about the middle of a step
+        moment = h / 2 * (first[:, 1:] + first[:, :-1]) - np.diff(second)
+        slope[row] = 12 * moment / h**3
+    return mean, slope
+
+
+def _integrals(time, level, at):
+    """Return the first and second integrals of held samples at some times."""
+    interval = np.diff(time)
+    first = np.concatenate([[0.0], np.cumsum(level[:-1] * interval)])
+    grown = first[:-1] * interval + level[:-1] * interval**2 / 2
+    second = np.concatenate([[0.0], np.cumsum(grown)])
+    last = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    after = np.clip(at - time[last], 0.0, interval[last])
+    once = first[last] + level[last] * after
+    return once, second[last] + first[last] * after + level[last] * after**2 / 2
 
 
 def _drive_error(part: Segments) -> tuple[float, float]:

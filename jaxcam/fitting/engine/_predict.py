@@ -37,29 +37,26 @@ def fly(model: Model, state, start, step, angle, rate):
     def advance(x, inputs):
         number, a, w = inputs
         t0 = start + number * step
-        # the drive turns uniformly within a step
-        system = model.driven(t0 + step / 2, a, w)
-        x1, k1 = runge_kutta(model, system, t0, x, step)
+        x1, k1 = runge_kutta(model, model.during(t0 + step / 2, a, w), t0, x, step)
         return x1, (x, k1)
 
     numbers = jnp.arange(angle.shape[0], dtype=float)
     end, (states, fields) = jax.lax.scan(advance, state, (numbers, angle, rate))
     t1 = start + angle.shape[0] * step
-    last = augmented_field(
-        model, model.driven(t1 - step / 2, angle[-1], rate[-1]), t1, end
-    )
+    system = model.during(t1 - step / 2, angle[-1], rate[-1])(t1)
+    last = augmented_field(model, system, t1, end)
     states = jnp.concatenate([states, end[None]])
     fields = jnp.concatenate([fields, last[None]])
     values, rates = jax.vmap(lambda x, f: _raw(model, x, f))(states, fields)
     return end, Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
 
 
-def runge_kutta(model: Model, system, t, x, h):
+def runge_kutta(model: Model, system_at, t, x, h):
     """Take one classical Runge-Kutta step of length `h`.
 
     Args:
         model: The model.
-        system: The system.
+        system_at: The system as a function of time.
         t: Time (s).
         x: State, shape `(n,)`.
         h: Step length (s).
@@ -69,7 +66,7 @@ def runge_kutta(model: Model, system, t, x, h):
     """
 
     def field(t, x):
-        return augmented_field(model, system, t, x)
+        return augmented_field(model, system_at(t), t, x)
 
     after, _, first = array_step(RK4, field, t, x, h)
     return after, first
@@ -236,7 +233,7 @@ def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
             return smallest_gap(system, t, x[:size])
 
         def move(x):
-            x = runge_kutta(model, system, t, x, shift)[0]
+            x = runge_kutta(model, lambda t: system, t, x, shift)[0]
             field = augmented_field(model, system, t + shift, x)
             along = jnp.ones_like(t), field
             return x, field, *jax.jvp(gap, (t + shift, x), along)

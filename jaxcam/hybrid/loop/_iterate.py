@@ -142,12 +142,7 @@ def _iterate(
         fastest=landing.fastest,
         fixed=jnp.where(locates, end.length + delay, chatter.duration),
         blur=functions.blur(landing.seen, landing.x, carried.extents, landing.mode),
-        held=tuple(
-            jnp.where(c, new, old)
-            for c, new, old in zip(
-                carried.contact, judged.held, carried.held, strict=True
-            )
-        ),
+        held=_suppressed(carried, judged),
     )
     kind = _kind(carried, lands, begins, released, stopped)
     if functions.k:
@@ -163,6 +158,12 @@ def _iterate(
         mode=mode,
     )
     return after_attempt(plan, carried, attempt), record
+
+
+def _suppressed(carried: LoopState, judged: Judged) -> tuple:
+    """Return for each constraint the largest gap that contact has suppressed."""
+    pairs = zip(carried.contact, judged.held, carried.held, strict=True)
+    return tuple(jnp.where(c, new, old) for c, new, old in pairs)
 
 
 def _judge_flights(

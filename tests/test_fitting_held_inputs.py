@@ -1,0 +1,94 @@
+"""An input that is held between samples, in steps that do not end at samples."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam import HybridSystem
+from jaxcam.fitting import fit, Input, Model, Parameter, Problem, Sensor
+from jaxcam.fitting.engine._predict import fly
+from jaxcam.recordings import Recording, segment
+
+
+_INTERVAL, _NOISE, _GAIN = 1e-3, 1e-7, 3.0
+_COUNT = 1201
+
+
+class Cart(HybridSystem):
+    """A free mass that is pushed by a force."""
+
+    gain: float = _GAIN
+    force: float = 0.0
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], self.gain * self.force])
+
+    def gap(self, t, state):
+        return jnp.ones_like(t)
+
+    def impact(self, t, state):
+        return state
+
+
+def _exact(force):
+    """Position and velocity at the samples, by summation."""
+    h, x, v = _INTERVAL, [0.0], [0.0]
+    for level in _GAIN * force[:-1]:
+        x.append(x[-1] + v[-1] * h + level * h * h / 2)
+        v.append(v[-1] + level * h)
+    return np.array(x), np.array(v)
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    """A recording with a force that jumps at every sample, and its problem."""
+    rng = np.random.default_rng(3)
+    force = rng.standard_normal(_COUNT)
+    x, v = _exact(force)
+    time = _INTERVAL * np.arange(_COUNT)
+    noisy = x + _NOISE * rng.standard_normal(_COUNT)
+    run = Recording("run", time, {"position_m": noisy, "force_N": force})
+    model = Model(
+        Cart(),
+        {"position_m": Sensor(0, noise=_NOISE)},
+        Input("force_N", lambda system: system.force),
+    )
+    gain = Parameter("gain", lambda m: m.system.gain, tolerance=0.5)
+    parts = [segment(run, "position_m", None, noise=_NOISE)]
+    return Problem.build(model, parts, [gain]), time, x, v
+
+
+def test_the_end_of_every_piece_is_exact(pushed):
+    """To 1e-12 m and m/s: integral and first moment of the input are those of the held
+    samples, although no step ends at a sample."""
+    problem, time, x, v = pushed
+    pieces, model = problem.pieces, problem.layout.at(problem.start.values[0])
+    part, exists = pieces.flown, np.flatnonzero(pieces.exists[0])
+    step = np.asarray(part.step)[0, exists]
+    assert np.all(np.abs(step / _INTERVAL - np.round(step / _INTERVAL)) > 1e-3)
+
+    def at(t):
+        k = np.minimum(int(np.floor(t / _INTERVAL + 1e-9)), _COUNT - 2)
+        s, level = t - time[k], (v[k + 1] - v[k]) / _INTERVAL
+        return np.array([x[k] + v[k] * s + level * s * s / 2, v[k] + level * s])
+
+    count = pieces.angle.shape[-1]
+    for k in exists:
+        start, h = float(part.start[0, k]), float(part.step[0, k])
+        end, _ = fly(
+            model,
+            jnp.asarray(at(start)),
+            start,
+            h,
+            jnp.asarray(pieces.angle[0, k]),
+            jnp.asarray(pieces.rate[0, k]),
+        )
+        np.testing.assert_allclose(end, at(start + count * h), rtol=0, atol=1e-12)
+
+
+def test_the_gain_of_an_input_is_not_biased(pushed):
+    """Within three standard errors, and the cost is that of the noise."""
+    found = fit(pushed[0])
+    (gain,) = found.estimates
+    assert abs(gain.value - _GAIN) < 3 * gain.stderr
+    assert found.cost < pushed[0].samples + 5 * np.sqrt(2 * pushed[0].samples)
