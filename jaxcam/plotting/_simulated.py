@@ -1,4 +1,4 @@
-"""Evaluate the model at the samples of a recording."""
+"""Obtain the simulated values at the samples of a recording."""
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +12,7 @@ def simulated_channel(
 ) -> Float[np.ndarray, " k"]:
     """Return the simulated channel at the samples of the recording; NaN elsewhere.
 
-    A comparison keeps the differences in flight and in contact, each at its sample.
+    A comparison contains the differences in flight and in contact, each at its sample.
 
     **Raises:** `ValueError` if the recording is not in the comparison.
     """
