@@ -124,7 +124,7 @@ def test_saved_systems_are_checked(tmp_path):
     cases = [
         (changed(format="other"), "not a saved system"),
         (changed(version=99), "version 99"),
-        (changed(system={**inner, "class": "Popen"}), "'Popen', which is not known"),
+        (changed(system={**inner, "class": "Popen"}), "'Popen', which is unknown"),
         (changed(system={**inner, "fields": {"gravity": 1.0}}), "lacks"),
     ]
     for found, message in cases:

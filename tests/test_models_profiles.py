@@ -95,9 +95,9 @@ def test_prepared_circle_can_be_batched():
 
 def test_too_few_harmonics_are_refused_where_values_are_known():
     profile = EccentricCircle(harmonics=5)
-    with pytest.raises(ValueError, match="Raise `harmonics`"):
+    with pytest.raises(ValueError, match="Increase `harmonics`"):
         profile.prepared()
-    with pytest.raises(ValueError, match="Raise `harmonics`"):
+    with pytest.raises(ValueError, match="Increase `harmonics`"):
         CamFollower(profile=profile).check()
     # a tracer has no value to judge
     jax.jit(lambda r: EccentricCircle(radius=r, harmonics=5).prepared()(0.4))(0.045)
@@ -233,7 +233,7 @@ def test_tables_that_are_no_profile(angles, lifts, message):
         ({"radius": -0.01}, "`radius`"),
         ({"half_height": 0.0}, "`half_height`"),
         ({"eccentricity": np.nan}, "`eccentricity`"),
-        ({"center_x": -0.249}, "right of the follower's hinge"),
+        ({"center_x": -0.249}, "right of the follower hinge"),
         ({"radius": 0.22}, "Move the cam away"),
     ],
 )

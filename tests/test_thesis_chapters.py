@@ -76,7 +76,7 @@ def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch, calibrated):
     table = figure_5_11.TARGET.table(calibrated, "default")
     computed = table.set_index("quantity")["computed"]
     assert computed["first speed without P(inf,1)"] == pytest.approx(152.66)
-    assert computed["part of the speeds behind it that repeat"] == 0.5
+    assert computed["share of the speeds above it with a periodic motion"] == 0.5
     assert computed["speeds at which the run failed"] == 2
 
 
@@ -96,7 +96,7 @@ def test_motions_are_what_the_thesis_names(target, calibrated):
     """
     table = found(target, calibrated)
     for name, row in table.iterrows():
-        if "does not repeat" in str(name):
+        if "aperiodic" in str(name):
             assert row["computed"] == 0 or row["computed"] > 4
         else:
             assert row["computed"] == row["printed"]
@@ -119,13 +119,13 @@ def test_experiment_of_section_4_7_meets_the_events_of_the_model(calibrated):
     P(1,1), and the printed end of P(2,2) is that of a diagram.
     """
     table = found("figure-4.17", calibrated)
-    model = table.filter(like="printed of the model", axis=0)["difference"].abs()
+    model = table.filter(like="printed for the model", axis=0)["difference"].abs()
     assert len(model) == 9
     outside = model.index.str.startswith(("P(1,1), from", "P(2,2) and its"))
     assert model[~outside].max() <= 0.5 + 1e-9
-    rig = table.filter(like="printed of the rig", axis=0)["difference"].abs()
-    assert rig["P(1,1), to; printed of the rig"] > 30
-    stored = found("figure-4.18", calibrated).filter(like="least stored", axis=0)
+    rig = table.filter(like="printed for the rig", axis=0)["difference"].abs()
+    assert rig["P(1,1), to; printed for the rig"] > 30
+    stored = found("figure-4.18", calibrated).filter(like="shortest time", axis=0)
     assert np.all(stored["computed"].between(9.5, 10.0))
 
 
@@ -160,7 +160,7 @@ def test_onset_and_sticking_time(calibrated):
 def test_two_attractors_at_145_rpm_in_their_basins(calibrated):
     table = found("figure-5.14", calibrated)
     assert list(table["difference"].dropna()) == [0.0, 0.0]
-    assert table["computed"].filter(like="part of").sum() == pytest.approx(1.0)
+    assert table["computed"].filter(like="share of").sum() == pytest.approx(1.0)
 
 
 @pytest.mark.slow
@@ -178,7 +178,7 @@ def test_branches_through_interruption_and_fold(calibrated):
     assert abs(sticking["interruption of chattering"] - 152.67658) < 0.04
     fold = found("figure-3.12", calibrated)["computed"]
     assert abs(fold["fold"] - 135.947) < 0.01
-    assert fold["saddles followed behind the fold, to"] > 136.5
+    assert fold["saddles followed beyond the fold, to"] > 136.5
 
 
 @pytest.mark.slow

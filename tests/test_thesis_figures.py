@@ -50,7 +50,7 @@ def test_ratio_of_figure_2_4(calibrated):
 def test_zeno_ball_of_figure_2_13(calibrated):
     """Events exactly (2.43); steps with an error that falls as their length does."""
     found = differences("figure-2.13", calibrated)
-    assert abs(found["accumulation time, by events"]) < 1e-12
+    assert abs(found["accumulation time, event detection"]) < 1e-12
     assert abs(found["accumulation time, 16000 time steps"]) < 5e-4
 
 

@@ -18,7 +18,7 @@ def test_multipliers_in_and_out_of_the_picture():
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     assert len(lines["stable"].get_xdata()) == 3
     # one that does not fit is marked at the edge, on its own side
-    edge = np.asarray(lines["outside the picture"].get_xdata())
+    edge = np.asarray(lines["outside the figure"].get_xdata())
     assert len(edge) == 1 and -2.0 <= edge[0] < -1.9
     assert figure.axes[0].get_xlabel() == r"real part of $\mu$ (–)"
     plt.close(figure)

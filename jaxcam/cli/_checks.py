@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 
-# largest number of values kept by a sweep: 8 bytes each must fit into a laptop's memory
+# maximum number of values kept by a sweep: 8 bytes each must fit into a laptop's memory
 _MOST = 2 * 10**8
 
 

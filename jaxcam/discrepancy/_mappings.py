@@ -5,7 +5,7 @@ from pathlib import Path
 import jax
 
 
-# Largest number of mappings observed in one diagnosis
+# Maximum number of mappings observed in one diagnosis
 _NEEDED = 30_000
 _USED, _LIMIT = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 

@@ -100,7 +100,7 @@ def stroboscope(
         turns: Number of periods.
         skip: Number of periods at the start that are not sampled.
         t0: Start time (s).
-        where: Picks the parameter that differs between trajectories
+        where: Selects the parameter that differs between trajectories
             (`lambda s: s.speed`, or its dotted name), or several.
         values: Value of that parameter in each trajectory, shape `(lanes,)` or
             `(lanes, k)`.

@@ -18,9 +18,10 @@ class BeltOscillator(FilippovSystem):
     """A mass on a moving belt with dry friction (stick-slip), dimensionless.
 
     `x'' + 2 damping x' + x = amplitude cos(omega t) + friction force`; the state is (x,
-    x'). The belt moves at a constant speed and pulls the mass along with
-    `friction / (1 + weakening |x' - belt|)`, which falls with the speed of slip, so
-    that the mass sticks and slips. Sticking is sliding on the surface x' = belt.
+    x'). The belt moves at constant speed and drags the mass with the force `friction /
+    (1 + weakening |x' - belt|)`, which decreases with the slip speed, so the mass
+    sticks and slips. Sticking of the mass is sliding (in the sense of Filippov) on the
+    surface x' = belt.
 
     Examples:
         >>> from jaxcam.models import BeltOscillator
@@ -29,16 +30,16 @@ class BeltOscillator(FilippovSystem):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     belt: jax.Array = parameter(0.2)
     """Speed of the belt."""
     friction: jax.Array = parameter(1.0)
-    """Largest friction force, in units of the spring's at x = 1."""
+    """Maximum friction force, in units of the spring force at x = 1."""
     weakening: jax.Array = parameter(3.0)
-    """Rate at which friction falls with slip; zero is Coulomb's law."""
+    """Rate at which friction decreases with slip speed; zero gives Coulomb's law."""
     damping: jax.Array = parameter(0.0)
     """Damping ratio."""
     amplitude: jax.Array = parameter(0.0)
@@ -47,14 +48,14 @@ class BeltOscillator(FilippovSystem):
     """Angular frequency of the forcing."""
 
     def above(self, t, state) -> jax.Array:
-        """Return the rates while the mass is faster than the belt: friction pulls
-        back.
+        """Return the rates while the mass is faster than the belt and friction
+        decelerates it.
         """
         return self._pulled(t, state, -1.0)
 
     def below(self, t, state) -> jax.Array:
-        """Return the rates while the mass is slower than the belt: friction pulls
-        along.
+        """Return the rates while the mass is slower than the belt and friction
+        accelerates it.
         """
         return self._pulled(t, state, 1.0)
 
@@ -76,7 +77,7 @@ class BeltOscillator(FilippovSystem):
 
     def _pulled(self, t, state, side):
         x, velocity = state[0], state[1]
-        # smooth beyond the surface: on this side the slip has the sign -side
+        # smooth beyond the surface: on this side, the slip has the sign -side
         slip = -side * (velocity - self.belt)
         force = side * self.friction / (1 + self.weakening * slip)
         drive = self.amplitude * jnp.cos(self.omega * t)

@@ -15,9 +15,10 @@ from ._parameters import (
 
 
 class BouncingBall(HybridSystem):
-    """A ball in free fall above a floor at `amplitude sin(frequency t)`.
+    """A ball in free fall above a floor that moves as `amplitude sin(frequency t)`.
 
-    The state is the height above the floor's mean position and the velocity (m, m/s).
+    The state is the height above the mean position of the floor and the velocity (m,
+    m/s).
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -26,18 +27,18 @@ class BouncingBall(HybridSystem):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("height", "velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     gravity: jax.Array = parameter(9.81)
     """Acceleration of free fall (m/s^2)."""
     restitution: jax.Array = parameter(0.8)
     """Coefficient of restitution, between 0 and 1."""
     amplitude: jax.Array = parameter(0.0)
-    """Amplitude of the floor's motion (m); zero for a floor at rest."""
+    """Amplitude of the floor motion (m); zero for a floor at rest."""
     frequency: jax.Array = parameter(1.0)
-    """Angular frequency of the floor's motion (rad/s)."""
+    """Angular frequency of the floor motion (rad/s)."""
 
     def vector_field(self, t, state) -> jax.Array:
         """Return velocity and acceleration, shape `(2,)`."""
@@ -49,8 +50,8 @@ class BouncingBall(HybridSystem):
         return state[0] - self.amplitude * jnp.sin(self.frequency * t)
 
     def impact(self, t, state) -> jax.Array:
-        """Return the state after an impact: the velocity relative to the floor is
-        reversed.
+        """Return the state after an impact; the velocity relative to the floor is
+        multiplied by -restitution.
         """
         floor_velocity = self.amplitude * self.frequency * jnp.cos(self.frequency * t)
         velocity = state[1] - floor_velocity
@@ -58,7 +59,7 @@ class BouncingBall(HybridSystem):
 
     @property
     def period(self) -> jax.Array:
-        """Period of the floor's motion (s), also where its amplitude is zero."""
+        """Period of the floor motion (s), even if its amplitude is zero."""
         return 2 * jnp.pi / self.frequency
 
     def check(self) -> None:

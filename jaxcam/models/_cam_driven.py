@@ -1,4 +1,4 @@
-"""Common parts of followers on a cam of constant speed."""
+"""Common parts of systems with a follower on a cam of constant speed."""
 
 from typing import TypeVar
 
@@ -15,7 +15,7 @@ _System = TypeVar("_System", bound="AbstractCamDriven")
 
 
 class AbstractCamDriven(HybridSystem):
-    """A follower, its state (position, velocity), over a cam of constant speed."""
+    """A follower on a cam of constant speed; its state is (position, velocity)."""
 
     profile: eqx.AbstractVar[CamProfile]
     speed: eqx.AbstractVar[jax.Array]
@@ -23,16 +23,16 @@ class AbstractCamDriven(HybridSystem):
     restitution: eqx.AbstractVar[eqx.Module]
 
     def cam_angle(self, t) -> jax.Array:
-        """Angle of the cam (rad) at `t` (s), elementwise."""
+        """Return the cam angle (rad) at `t` (s), elementwise."""
         return self.speed * t + self.phase
 
     @property
     def cam_velocity(self) -> jax.Array:
-        """Rate of change of the cam's angle (rad/s)."""
+        """Rate of change of the cam angle (rad/s)."""
         return self.speed
 
     def after_impact(self, t, state) -> jax.Array:
-        """Return the state after an impact on the cam: the relative velocity v
+        """Return the state after an impact on the cam, in which the relative velocity v
         becomes -r v.
         """
         cam = (self.cam_angle(t),), (self.cam_velocity,)

@@ -1,4 +1,4 @@
-"""The thesis' cam-follower rig: a sprung follower that impacts a turning cam."""
+"""The cam-follower rig of the thesis: a spring-loaded follower on a rotating cam."""
 
 from typing import ClassVar
 
@@ -21,11 +21,11 @@ _SENSE = {"clockwise": -1.0, "counterclockwise": 1.0}
 
 
 class CamFollower(AbstractCamDriven):
-    """A hinged follower, pressed by a spring onto a cam that turns at constant speed.
+    """A hinged follower pressed by a spring onto a cam that turns at constant speed.
 
-    The state is the follower's angle and velocity (rad, rad/s); the gap is the angle
-    (rad) between the follower and its contact angle. The defaults are Table 4.4 as
-    printed, at 145 rpm.
+    The state is the angle and velocity of the follower (rad, rad/s); the gap is the
+    follower angle minus the contact angle (rad). The defaults are those of the thesis,
+    Table 4.4, as printed, at 145 rpm.
 
     Raises:
         ValueError: `rotation` is neither "clockwise" nor "counterclockwise".
@@ -38,35 +38,37 @@ class CamFollower(AbstractCamDriven):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("follower angle", "follower velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("rad", "rad/s")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     speed: jax.Array = parameter(rpm_to_rad_s(145.0))
     """Speed of the cam (rad/s)."""
     phase: jax.Array = parameter(0.0)
-    """Angle that the cam has turned at time zero (rad)."""
+    """Cam angle at time zero (rad)."""
     inertia: jax.Array = parameter(0.043)
     """Moment of inertia of the follower about its hinge, J (kg m^2)."""
     stiffness: jax.Array = parameter(105.0)
     """Spring coefficient K (N/m)."""
     spring_hook_x: jax.Array = parameter(-0.031)
-    """x-coordinate of the spring's suspension point, x_A (m)."""
+    """x-coordinate of the suspension point of the spring, x_A (m)."""
     spring_elongation: jax.Array = parameter(0.173)
     """y_A - d_0 - d_1 (m)."""
     spring_half_height: jax.Array = parameter(0.021)
-    """d in the spring's torque (m). The half height that sets the contact angle belongs
-    to the profile, so that each can be fitted."""
+    """d in the spring torque (m). The half height that determines the contact angle
+    belongs to the profile, so that both can be fitted separately.
+    """
     profile: CamProfile = eqx.field(default_factory=EccentricCircle)
-    """Contact angle as a function of the cam's angle, a [`jaxcam.models.CamProfile`][].
+    """Contact angle as a function of the cam angle, a
+    [`jaxcam.models.CamProfile`][].
     """
     restitution: eqx.Module = eqx.field(default_factory=LinearInSpeed)
-    """Restitution law `r(speed, approach_speed)`, any Module; approach speed in
+    """Restitution law `r(speed, approach_speed)`, any module; the approach speed is in
     rad/s.
     """
     rotation: str = eqx.field(default="clockwise", static=True)
     """"clockwise" or "counterclockwise". The tables of the thesis require a cam that
-    turns clockwise, although its Table 4.3 counts angles the other way.
+    turns clockwise, although angles in its Table 4.3 are positive counterclockwise.
     """
 
     def __check_init__(self):
@@ -77,12 +79,13 @@ class CamFollower(AbstractCamDriven):
             )
 
     def vector_field(self, t, state) -> jax.Array:
-        """Return velocity and acceleration of the free follower, `(2,)` (thesis,
+        """Return the velocity and acceleration of the free follower, `(2,)` (thesis,
         eq. 4.9).
         """
         del t
         angle, velocity = state[0], state[1]
-        # one sine and one cosine: this is evaluated in every Runge-Kutta stage
+        # only one sine and one cosine, because this is evaluated in every Runge-Kutta
+        # stage
         sine, cosine = jnp.sin(angle), jnp.cos(angle)
         secant = 1 / cosine
         stretch = self._reach(sine, secant) - self.spring_elongation
@@ -99,14 +102,14 @@ class CamFollower(AbstractCamDriven):
         return self.after_impact(t, state)
 
     def cam_angle(self, t) -> jax.Array:
-        """Return the angle of the cam (rad), counted counterclockwise, at `t` (s),
+        """Return the cam angle (rad) at `t` (s), positive counterclockwise,
         elementwise.
         """
         return _SENSE[self.rotation] * (self.speed * t + self.phase)
 
     @property
     def cam_velocity(self) -> jax.Array:
-        """Rate of change of the cam's angle (rad/s)."""
+        """Rate of change of the cam angle (rad/s)."""
         return _SENSE[self.rotation] * self.speed
 
     def contact_angle(self, cam_angle) -> jax.Array:
@@ -116,8 +119,8 @@ class CamFollower(AbstractCamDriven):
         return self.profile(cam_angle)
 
     def potential_energy(self, follower_angle) -> jax.Array:
-        """Return the spring's energy (J) at `follower_angle` (rad) (thesis,
-        eq. 4.8).
+        """Return the energy of the spring (J) at `follower_angle` (rad) (thesis, eq.
+        4.8).
         """
         reach = self._reach(jnp.sin(follower_angle), 1 / jnp.cos(follower_angle))
         return 0.5 * self.stiffness * (reach - self.spring_elongation) ** 2
@@ -125,8 +128,8 @@ class CamFollower(AbstractCamDriven):
     def load_terms(self, lift, slope, curvature):
         """Return a, b and c of the contact torque `a w^2 + b w + c` (N m) at speed w.
 
-        Lift, slope and curvature are the profile's, per radian of the cam (thesis,
-        eq. 4.10).
+        Lift, slope and curvature are those of the profile, per radian of the cam
+        (thesis, eq. 4.10).
         """
         at_rest = jnp.stack([lift, jnp.zeros_like(lift)])
         spring = -self.inertia * self.vector_field(0.0, at_rest)[1]
@@ -146,5 +149,5 @@ class CamFollower(AbstractCamDriven):
         self.check_cam()
 
     def _reach(self, sine, secant):
-        # x_A tan(theta) + d / cos(theta), the spring's end on the follower
+        # x_A tan(theta) + d / cos(theta), the end of the spring on the follower
         return (self.spring_hook_x * sine + self.spring_half_height) * secant

@@ -15,7 +15,7 @@ from .cams import flat_oscillating_contour, MotionPieces, MotionProgram, profile
 _TURN = 2 * np.pi
 _SAMPLES = 1025
 _HALVINGS = 60
-"""Iterations of the golden section, from two steps of the scan to rounding."""
+"""Number of golden-section iterations, from two steps of the scan to rounding."""
 _GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -23,7 +23,7 @@ class FloatSpeed(NamedTuple):
     """The lowest speed at which a follower leaves its cam, and the cam angle there."""
 
     speed: Float[Array, ""]
-    """Speed (rad/s); infinite where the follower never leaves."""
+    """Speed (rad/s); infinite if the follower never leaves the cam."""
     cam_angle: Float[Array, ""]
     """Cam angle (rad)."""
 
@@ -31,15 +31,15 @@ class FloatSpeed(NamedTuple):
 def contact_load(
     system: CamFollower | ValveTrain, cam_angles: Float[ArrayLike, " angles"]
 ) -> Float[Array, " angles"]:
-    """Return the load with which the cam must press for permanent contact.
+    """Return the load that the cam must exert for permanent contact.
 
-    A torque (N m) about the hinge of a [`jaxcam.models.CamFollower`][], a force (N) on
-    a [`jaxcam.models.ValveTrain`][], at the system's speed (thesis, eq. 4.10). Contact
-    is lost where the load would have to be negative.
+    The load at the speed of the system is a torque (N m) about the hinge of a
+    [`jaxcam.models.CamFollower`][], or a force (N) on a [`jaxcam.models.ValveTrain`][]
+    (thesis, eq. 4.10). Contact is lost where the load would have to be negative.
 
     Args:
         system: The system.
-        cam_angles: Angles of the cam (rad), as the profile counts them, shape
+        cam_angles: Cam angles (rad), counted as in the profile, shape
             `(angles,)`.
 
     Returns:
@@ -62,16 +62,17 @@ def contact_force(
     *,
     center: tuple | None = None,
 ) -> Float[Array, " angles"]:
-    """Return the force normal to the contact (N): for a hinged follower, torque over
-    lever.
+    """Return the normal contact force (N); for a hinged follower, torque divided by
+    lever arm.
 
-    The lever is l of the thesis, eq. 4.19.
+    The lever arm is l in the thesis, eq. 4.19.
 
     Args:
         system: The system.
-        cam_angles: Angles of the cam (rad), as the profile counts them, shape
+        cam_angles: Cam angles (rad), counted as in the profile, shape
             `(angles,)`.
-        center: Axis of the cam (m) from the hinge; known for an eccentric circle.
+        center: Position of the cam axis relative to the hinge (m); known for an
+            eccentric circle.
 
     Returns:
         Shape `(angles,)`.
@@ -95,13 +96,13 @@ def contact_force(
 
 
 def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
-    """Return the lowest speed of valve float, at which the cam would first have to
-    pull.
+    """Return the lowest speed of valve float, at which the contact force would have to
+    be tensile.
 
-    It is the least root, over the cam's angles, of the contact load as a function of
-    the speed. At the joints of a motion program the accelerations on both sides count,
-    and a joint where the velocity falls makes every speed too high. Differentiable in
-    the parameters.
+    It is the smallest root, over all cam angles, of the contact load as a function of
+    the speed. At the joints of a motion program, the accelerations on both sides are
+    considered; if the velocity falls at a joint, every speed is too high. The result is
+    differentiable in the parameters.
 
     Args:
         system: The system.
@@ -144,7 +145,7 @@ def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
     refined = (low + high) / 2
     coarse = angles.reshape(-1)[best]
     better = speed_at(piece, refined) < speed_at(piece, coarse)
-    # the place of a minimum is fixed when its value is differentiated
+    # the position of a minimum is held fixed when its value is differentiated
     angle = jax.lax.stop_gradient(jnp.where(better, refined, coarse))
     speed = speed_at(piece, angle)
     fall, where = _sharpest_fall(system.profile)
@@ -167,7 +168,9 @@ def _pieces(profile):
 
 
 def _least_root(a, b, c):
-    """Least positive root of a w^2 + b w + c where c > 0, infinite without one."""
+    """Return the smallest positive root of a w^2 + b w + c for c > 0; infinite if there
+    is none.
+    """
     discriminant = b * b - 4 * a * c
     real = discriminant >= 0
     divisor = jnp.sqrt(jnp.where(real, discriminant, 1.0)) - b
@@ -177,9 +180,9 @@ def _least_root(a, b, c):
 
 
 def _sharpest_fall(profile):
-    """Return the most negative jump of the profile's slope, and its cam angle.
+    """Return the most negative jump of the slope of the profile, and its cam angle.
 
-    An upward kink throws the follower off for either sense of rotation.
+    A convex kink throws the follower off for either sense of rotation.
     """
     if not isinstance(profile, MotionProgram):
         return jnp.zeros(()), jnp.zeros(())

@@ -1,4 +1,4 @@
-"""A follower held from both sides: the form-closed, or desmodromic, joint."""
+"""A follower guided from both sides: the form-closed, or desmodromic, joint."""
 
 from typing import ClassVar
 
@@ -21,8 +21,8 @@ from .cams import CamProfile
 class DesmodromicCam(AbstractCamDriven):
     """A translating follower between two flanks that move with the cam.
 
-    The flanks prescribe the same lift, one from below and one from above, a clearance
-    apart. There are two gaps: to the lower flank and to the upper one. A spring is
+    The flanks prescribe the same lift from below and from above, with a clearance
+    between them. There are two gaps, to the lower and to the upper flank. A spring is
     optional.
 
     Examples:
@@ -35,14 +35,14 @@ class DesmodromicCam(AbstractCamDriven):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "follower velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
-    """Units of the state's components."""
+    """Units of the state components."""
     constraint_names: ClassVar[tuple[str, ...]] = ("lower flank", "upper flank")
     """Names of the constraints."""
 
     profile: CamProfile
-    """Lift (m) of the lower flank as a function of the cam's angle."""
+    """Lift (m) of the lower flank as a function of the cam angle."""
     speed: jax.Array = parameter()
     """Speed of the cam (rad/s)."""
     clearance: jax.Array = parameter()
@@ -50,20 +50,20 @@ class DesmodromicCam(AbstractCamDriven):
     mass: jax.Array = parameter(1.0)
     """Mass of the follower (kg)."""
     stiffness: jax.Array = parameter(0.0)
-    """Stiffness of its spring (N/m)."""
+    """Stiffness of the spring (N/m)."""
     preload: jax.Array = parameter(0.0)
-    """Force of the spring at lift zero (N)."""
+    """Force of the spring at zero lift (N)."""
     damping: jax.Array = parameter(0.0)
     """Viscous damping (N s/m)."""
     restitution: eqx.Module = eqx.field(
         default_factory=lambda: ConstantRestitution(as_parameter(0.5))
     )
-    """Law `r(speed, approach_speed)` of both flanks."""
+    """Restitution law `r(speed, approach_speed)` of both flanks."""
     phase: jax.Array = parameter(0.0)
     """Angle of the cam at time zero (rad)."""
 
     def vector_field(self, t, state) -> jax.Array:
-        """Return velocity and acceleration between the flanks, shape `(2,)`."""
+        """Return the velocity and acceleration between the flanks, shape `(2,)`."""
         del t
         force = self.stiffness * state[0] + self.preload + self.damping * state[1]
         return jnp.stack([state[1], -force / self.mass])

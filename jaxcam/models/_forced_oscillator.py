@@ -12,9 +12,9 @@ class ForcedOscillator(eqx.Module):
     """Forced linear oscillator without impacts, with its solution in closed form.
 
     `u'' + 2 damping u' + stiffness u = amplitude cos(omega t)` (thesis, eq. 2.4), on
-    the cylinder: the state is (u, u', time in the period), and the last component
-    closes after 2 pi / omega. (The thesis writes cos(x3) in its eq. 2.5, which fits
-    omega = 1.)
+    the cylinder: the state is (u, u', time within the period), and the last component
+    is periodic with 2 pi / omega. (The thesis has cos(x3) in its eq. 2.5, which is
+    valid for omega = 1.)
 
     Examples:
         >>> from jaxcam.models import ForcedOscillator
@@ -24,7 +24,7 @@ class ForcedOscillator(eqx.Module):
     """
 
     damping: jax.Array = parameter(0.05)
-    """Half the damping coefficient."""
+    """Half of the damping coefficient."""
     stiffness: jax.Array = parameter(1.0)
     """Square of the natural frequency."""
     amplitude: jax.Array = parameter(1.0)
@@ -45,8 +45,8 @@ class ForcedOscillator(eqx.Module):
         return jnp.stack([velocity, acceleration, jnp.ones_like(time)])
 
     def steady(self, time) -> Float[Array, " 2"]:
-        """Return position and velocity of the periodic motion at a time, shape
-        `(2,)`.
+        """Return the position and velocity of the periodic motion at a given time,
+        shape `(2,)`.
         """
         real = self.stiffness - self.omega**2
         imaginary = 2 * self.damping * self.omega
@@ -68,13 +68,13 @@ class ForcedOscillator(eqx.Module):
         return jax.scipy.linalg.expm(matrix * duration)
 
     def solution(self, time, state: Float[Array, " 3"]) -> Float[Array, " 3"]:
-        """Return the exact state a duration `time` after `state`, shape `(3,)`."""
+        """Return the exact state at a `time` after `state`, shape `(3,)`."""
         start = state[2]
         moved = self.propagator(time) @ (state[:2] - self.steady(start))
         end = start + time
         return jnp.append(moved + self.steady(end), jnp.mod(end, self.period))
 
     def poincare_map(self, point: Float[Array, " 2"]) -> Float[Array, " 2"]:
-        """Return position and velocity one period after time zero, shape `(2,)`."""
+        """Return the position and velocity one period after time zero, shape `(2,)`."""
         zero = jnp.zeros(())
         return self.solution(self.period, jnp.append(point, zero))[:2]

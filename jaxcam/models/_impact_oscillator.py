@@ -28,9 +28,9 @@ class ImpactOscillator(HybridSystem):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     omega: jax.Array = parameter(2.8)
     """Angular frequency of the forcing."""
@@ -53,7 +53,7 @@ class ImpactOscillator(HybridSystem):
         return self.wall - state[0]
 
     def impact(self, t, state) -> jax.Array:
-        """Return the state after an impact: the velocity is multiplied by
+        """Return the state after an impact; the velocity is multiplied by
         -restitution.
         """
         del t

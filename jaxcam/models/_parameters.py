@@ -14,7 +14,7 @@ def as_parameter(value) -> jax.Array:
 
 
 def parameter(default=None):
-    """Declare a floating-point field; without a default it must be given."""
+    """Declare a floating-point field; without a default, it must be given."""
     if default is None:
         return eqx.field(converter=as_parameter)
     return eqx.field(default=default, converter=as_parameter)
@@ -42,13 +42,11 @@ def require_not_negative(**values) -> None:
     require_finite(**values)
     for name, value in values.items():
         if not np.all(np.asarray(value) >= 0):
-            raise ValueError(
-                f"Give a number that is not negative for `{name}`; it is {value}."
-            )
+            raise ValueError(f"Give a non-negative number for `{name}`; it is {value}.")
 
 
 def require_restitution(value, where: str = "") -> None:
-    """Raise `ValueError` for a restitution outside [0, 1], which is unphysical."""
+    """Raise `ValueError` for a coefficient of restitution outside [0, 1]."""
     if not np.all((np.asarray(value) >= 0) & (np.asarray(value) <= 1)):
         raise ValueError(
             "Choose a coefficient of restitution between 0 and 1; it is "

@@ -1,4 +1,4 @@
-"""Define two linear systems joined along a line, and the stability of their origin."""
+"""Two linear systems joined along a line, and the stability of their origin."""
 
 from typing import NamedTuple
 
@@ -16,8 +16,8 @@ _JOINED = 1e-9
 class PiecewiseLinear(FilippovSystem):
     """Piecewise-linear system: `x' = A- x` for c x <= 0 and `x' = A+ x` for c x >= 0.
 
-    Where the field is continuous, A+ - A- = k c for some vector k, there is no sliding;
-    in general there is (thesis, eq. 2.44).
+    If the field is continuous, that is, A+ - A- = k c for some vector k, there is no
+    sliding; otherwise there is in general (thesis, eq. 2.44).
 
     Examples:
         >>> from jaxcam.models import PiecewiseLinear
@@ -54,17 +54,17 @@ class PiecewiseLinear(FilippovSystem):
 
 
 class PlanarStability(NamedTuple):
-    """Stability of the origin by Theorem 2.2 of the thesis."""
+    """Stability of the origin (thesis, Theorem 2.2)."""
 
     stable: bool
     """Whether the origin is asymptotically stable."""
     periodic: bool
     """Whether every motion is periodic."""
     period: float
-    """Period of these motions (s); NaN where they are not periodic."""
+    """Period of the motions (s); NaN if they are not periodic."""
     growth: float
-    """Growth of the logarithm of the amplitude in one turn around the origin; NaN
-    without rotation.
+    """Growth of the logarithm of the amplitude in one turn around the origin; NaN if
+    there is no rotation.
     """
 
 
@@ -79,8 +79,8 @@ def planar_stability(system: PiecewiseLinear) -> PlanarStability:
         A `PlanarStability`.
 
     Raises:
-        ValueError: The system has another number of states, its field jumps at the
-            line, or the pair (c, A-) is not observable.
+        ValueError: The system does not have two states, its field jumps at the line, or
+            the pair (c, A-) is not observable.
 
     Examples:
         >>> from jaxcam.models import PiecewiseLinear, planar_stability
@@ -93,12 +93,12 @@ def planar_stability(system: PiecewiseLinear) -> PlanarStability:
     minus, plus = np.asarray(system.minus), np.asarray(system.plus)
     c = np.asarray(system.normal)
     if minus.shape != (2, 2) or plus.shape != (2, 2) or c.shape != (2,):
-        raise ValueError("Theorem 2.2 is about two states; give 2 by 2 matrices.")
+        raise ValueError("Theorem 2.2 is for two states; give 2 by 2 matrices.")
     tangent = np.array([-c[1], c[0]])
     scale = np.linalg.norm(c) * max(np.linalg.norm(minus), np.linalg.norm(plus))
     if np.linalg.norm((plus - minus) @ tangent) > _JOINED * scale:
         raise ValueError(
-            "Join the two fields continuously: A+ - A- must be a column times c."
+            "The field must be continuous: A+ - A- must be a column times c."
         )
     if abs(np.linalg.det(np.stack([c, c @ minus]))) <= 1e-12 * scale * np.linalg.norm(
         c

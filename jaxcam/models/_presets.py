@@ -1,4 +1,4 @@
-"""Define named parameter sets."""
+"""Named parameter sets."""
 
 from collections.abc import Callable
 
@@ -39,10 +39,10 @@ def preset(name: str) -> CamFollower:
     """Return the cam-follower with a named set of parameters.
 
     Args:
-        name: "table-4.4", the thesis' Table 4.4 as printed, or "calibrated", the
-            parameters behind its Tables 5.2 and 6.1, recovered from those tables by a
-            fit that starts at Table 4.4. At time zero of the latter the cam lifts the
-            follower highest, as in the thesis' chapters 5 and 6.
+        name: "table-4.4" for Table 4.4 of the thesis as printed, or "calibrated" for
+            the parameters behind its Tables 5.2 and 6.1, recovered from those tables by
+            a fit that starts at Table 4.4. With "calibrated", the lift is highest at
+            time zero, as in chapters 5 and 6 of the thesis.
 
     Returns:
         A [`jaxcam.models.CamFollower`][].
@@ -57,5 +57,5 @@ def preset(name: str) -> CamFollower:
     """
     if name not in _PRESETS:
         names = ", ".join(f'"{known}"' for known in _PRESETS)
-        raise ValueError(f"Choose a preset among {names}; {name!r} is none of them.")
+        raise ValueError(f"Choose one of the presets {names}, not {name!r}.")
     return _PRESETS[name]()

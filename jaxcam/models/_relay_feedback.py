@@ -12,7 +12,7 @@ class RelayFeedback(FilippovSystem):
     states.
 
     Raises:
-        ValueError: The shapes do not fit.
+        ValueError: The shapes are inconsistent.
 
     Examples:
         >>> from jaxcam.models import RelayFeedback

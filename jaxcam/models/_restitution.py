@@ -1,4 +1,4 @@
-"""Define laws of restitution: separation speed over approach speed of an impact."""
+"""Restitution laws: the ratio of separation speed to approach speed of an impact."""
 
 import equinox as eqx
 import jax
@@ -10,7 +10,7 @@ from ._units import rad_s_to_rpm
 
 # Laws are called as `law(speed, approach_speed)`, with the speed of the drive (rad/s)
 # and the magnitude of the normal velocity just before the impact, in the units of the
-# gap per second. Any Module with this call is a law.
+# gap per second. Any module that can be called in this way is a law.
 
 
 class ConstantRestitution(eqx.Module):
@@ -31,13 +31,13 @@ class ConstantRestitution(eqx.Module):
 
 
 class LinearInSpeed(eqx.Module):
-    """Restitution that grows linearly with the speed of the drive, limited to [0, 1].
+    """Coefficient of restitution linear in the drive speed, limited to [0, 1].
 
-    The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not print it.
-    It follows from its Table 5.2: free flight is conservative, hence the product of the
-    two multipliers of an orbit with one impact per period is r^2. The defaults are the
-    line through the ten values of r found in this manner, rounded (which changes r by
-    5e-7).
+    The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not give its
+    numbers. They follow from its Table 5.2: because free flight is conservative, the
+    product of the two multipliers of an orbit with one impact per period is r^2. The
+    defaults are the line through the ten values of r obtained in this way, rounded
+    (which changes r by 5e-7).
 
     Examples:
         >>> from jaxcam.models import LinearInSpeed
@@ -46,9 +46,9 @@ class LinearInSpeed(eqx.Module):
     """
 
     slope: jax.Array = parameter(rad_s_to_rpm(0.00795658))
-    """Change of the coefficient per speed (s/rad)."""
+    """Slope of the coefficient with respect to the speed (s/rad)."""
     intercept: jax.Array = parameter(-0.62122908)
-    """Value of the line at speed zero."""
+    """Value of the line at zero speed."""
 
     def __call__(self, speed, approach_speed) -> jax.Array:
         del approach_speed
@@ -56,7 +56,8 @@ class LinearInSpeed(eqx.Module):
 
 
 class PowerLawRestitution(eqx.Module):
-    """Restitution that falls with the approach speed: r = r0 (1 + v / v_ref)^-b.
+    """Coefficient of restitution that decreases with approach speed: r = r0 (1 + v /
+    v_ref)^-b.
 
     Examples:
         >>> from jaxcam.models import PowerLawRestitution
@@ -65,10 +66,11 @@ class PowerLawRestitution(eqx.Module):
     """
 
     r0: jax.Array = parameter()
-    """Coefficient of the slowest impacts, between 0 and 1."""
+    """Coefficient r0 in the limit of slow impacts, between 0 and 1."""
     reference_speed: jax.Array = parameter()
-    """Approach speed at which the coefficient has fallen to r0 / 2^b, in units of the
-    gap per second."""
+    """Approach speed v_ref at which the coefficient is r0 / 2^b, in units of the gap
+    per second.
+    """
     exponent: jax.Array = parameter()
     """Exponent b; zero makes the coefficient constant."""
 

@@ -1,4 +1,4 @@
-"""Simulate motion on a cam whose program has joints; each joint is an event."""
+"""Simulate the motion on a cam whose motion program has joints, which are events."""
 
 from typing import Any, TypeVar
 
@@ -19,14 +19,14 @@ from .cams import CamProfile, MotionPieces, MotionProgram
 
 _TURN = 2 * np.pi
 _NEAR = 4e-12
-"""Tolerance of distance and velocity in contact, relative to the size of the state."""
+"""Tolerance of gap and velocity in contact, relative to the size of the state."""
 _BEHIND = 2e-4
-"""Distance by which a body that moves inwards is placed behind the surface."""
+"""Distance behind the surface at which a body that moves inwards is placed."""
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 
 class OnePiece(CamProfile):
-    """One piece of a program, continued smoothly beyond both of its ends."""
+    """One piece of a program, continued smoothly beyond its ends."""
 
     pieces: MotionPieces
     middle: jax.Array = parameter()
@@ -47,11 +47,11 @@ def simulate_through_joints(
 ) -> Trajectory:
     """Simulate a cam given by a motion program, including its joints exactly.
 
-    The run stops at every joint and continues with the piece after it, so that each
-    part is smooth. At a joint where the slope of the lift jumps up, a follower in
-    contact has an impact; where it jumps down the follower is thrown off. Times of
-    joints do not depend on the state: a deviation passes them unchanged, and saltation
-    matrices are those of the impacts alone.
+    The run stops at every joint and continues with the next piece, so that each part is
+    smooth. At a joint where the slope of the lift jumps up, a follower in contact has
+    an impact; where it jumps down, the follower is thrown off. The times of the joints
+    do not depend on the state, so a deviation passes them unchanged, and only impacts
+    have saltation matrices.
 
     Args:
         system: A system whose `profile` is a [`jaxcam.models.MotionProgram`][].
@@ -61,7 +61,7 @@ def simulate_through_joints(
         options: As for [`jaxcam.simulate`][jaxcam.hybrid.simulate].
 
     Returns:
-        One trajectory; a contact that lasts through a joint is listed once.
+        One trajectory, in which a contact that lasts through a joint is listed once.
 
     Raises:
         ValueError: The profile is not a motion program; see also `simulate`.
@@ -80,8 +80,8 @@ def simulate_through_joints(
     program = system.profile
     if not isinstance(program, MotionProgram):
         raise ValueError(
-            "Give the system a MotionProgram as its `profile`; other profiles are "
-            "smooth, and `jaxcam.simulate` is for them."
+            "Give the system a MotionProgram as its `profile`; for other profiles, "
+            "which are smooth, use `jaxcam.simulate`."
         )
     system.check()
     pieces = program.prepared()

@@ -1,4 +1,4 @@
-"""Define the simplest system with chatter and a release point."""
+"""The simplest system with chatter and a release point."""
 
 from typing import ClassVar
 
@@ -13,9 +13,9 @@ class TripleIntegrator(HybridSystem):
     """Triple integrator above a floor: `x' = v`, `v' = a`, `a' = 1` for `x > 0`.
 
     The state is (x, v, a) (thesis, eqs. 6.22-6.24). Every system with impacts has this
-    form close to the release point of a sticking orbit, with the jerk there scaled to
-    one: started with a negative acceleration it chatters, and once at rest it is
-    released where the acceleration is zero.
+    form close to the release point of a sticking orbit, with the jerk at release scaled
+    to one. Starting with a negative acceleration, it chatters; once in contact, it is
+    released when the acceleration reaches zero.
 
     Examples:
         >>> from jaxcam.models import TripleIntegrator
@@ -24,9 +24,9 @@ class TripleIntegrator(HybridSystem):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity", "acceleration")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-", "-")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     restitution: jax.Array = parameter(0.8)
     """Coefficient of restitution, between 0 and 1."""
@@ -44,12 +44,12 @@ class TripleIntegrator(HybridSystem):
         return state[0]
 
     def impact(self, t, state) -> jax.Array:
-        """Return the state after an impact: v becomes -restitution v (thesis,
+        """Return the state after an impact, in which v becomes -restitution v (thesis,
         eq. 6.24).
         """
         del t
         return jnp.stack([state[0], -self.restitution * state[1], state[2]])
 
     def check(self) -> None:
-        """Raise `ValueError` if the restitution has no physical meaning."""
+        """Raise `ValueError` if the coefficient of restitution is invalid."""
         require_restitution(self.restitution)

@@ -1,4 +1,4 @@
-"""Convert revolutions per minute, used only in input and output."""
+"""Convert revolutions per minute, which are used only in input and output."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Define a valve, or any sliding mass, pressed onto a cam by a spring."""
+"""A valve, or any translating mass, pressed onto a cam by a spring."""
 
 from typing import ClassVar
 
@@ -22,8 +22,8 @@ class ValveTrain(AbstractCamDriven):
     """A translating follower on a cam of constant speed: m x'' + c x' + k x + F0 =
     contact.
 
-    The state is the follower's lift and velocity (m, m/s); the gap is the distance
-    between the follower and the lift of the cam.
+    The state is the lift and velocity of the follower (m, m/s); the gap is the distance
+    between the follower and the cam.
 
     Examples:
         >>> from jaxcam.models import MotionProgram, Segment, ValveTrain
@@ -35,27 +35,28 @@ class ValveTrain(AbstractCamDriven):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("lift", "valve velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("m", "m/s")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     profile: CamProfile
-    """Lift (m) as a function of the cam's angle, such as a
-    [`jaxcam.models.MotionProgram`][]."""
+    """Lift (m) as a function of the cam angle, such as a
+    [`jaxcam.models.MotionProgram`][].
+    """
     speed: jax.Array = parameter()
-    """Speed of the cam (rad/s), half that of a four-stroke engine's crank."""
+    """Speed of the cam (rad/s), half the crankshaft speed of a four-stroke engine."""
     mass: jax.Array = parameter()
     """Mass that moves with the valve (kg), including a third of the spring mass."""
     stiffness: jax.Array = parameter()
     """Stiffness of the valve spring (N/m)."""
     preload: jax.Array = parameter()
-    """Force of the spring at lift zero (N)."""
+    """Force of the spring at zero lift (N)."""
     damping: jax.Array = parameter(0.0)
     """Viscous damping (N s/m)."""
     restitution: eqx.Module = eqx.field(
         default_factory=lambda: ConstantRestitution(as_parameter(0.5))
     )
-    """Law `r(speed, approach_speed)`, approach speed in m/s."""
+    """Restitution law `r(speed, approach_speed)`, with the approach speed in m/s."""
     phase: jax.Array = parameter(0.0)
     """Angle of the cam at time zero (rad)."""
 
@@ -71,13 +72,15 @@ class ValveTrain(AbstractCamDriven):
         return state[0] - self.profile(self.cam_angle(t))
 
     def impact(self, t, state) -> jax.Array:
-        """Return the state after an impact: the relative velocity v becomes -r v."""
+        """Return the state after an impact, in which the relative velocity v becomes -r
+        v.
+        """
         return self.after_impact(t, state)
 
     def load_terms(self, lift, slope, curvature):
         """Return a, b and c of the contact force `a w^2 + b w + c` (N) at speed w.
 
-        Lift, slope and curvature are the profile's, per radian of the cam.
+        Lift, slope and curvature are those of the profile, per radian of the cam.
         """
         return (
             self.mass * curvature,

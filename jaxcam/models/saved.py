@@ -1,4 +1,4 @@
-"""Save systems as JSON: the name of the class and its parameters, no code.
+"""Save systems as JSON, with the name of the class and the parameters but no code.
 
 ```json
 {"format": "jaxcam.system", "version": 1,
@@ -7,7 +7,7 @@
 ```
 
 A field is a number, a list of numbers, a string, another object of this kind, or a list
-of these, as `{"items": [...]}`.
+of such objects, written as `{"items": [...]}`.
 """
 
 import dataclasses
@@ -57,12 +57,12 @@ def save_system(
     Args:
         system: The system.
         file: The file to write.
-        about: Additional data to store, in plain JSON: errors of the parameters, their
-            origin.
+        about: Additional data to store, in plain JSON, such as the errors and the
+            origin of the parameters.
 
     Raises:
-        ValueError: A field of the system is not a number, an array, a word or another
-            Module.
+        ValueError: A field of the system is not a number, an array, a string or another
+            module.
 
     Examples:
         >>> from jaxcam.models import BouncingBall, load_system, save_system
@@ -76,19 +76,19 @@ def save_system(
 
 
 def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSystem:
-    """Read a system that `save_system` has written.
+    """Read a system written by `save_system`.
 
     Args:
         file: The file to read.
-        classes: Additional classes, other than those of `jaxcam.models`, that may occur
-            in it, such as a system of your own, or
+        classes: Classes that may occur in the file in addition to those of
+            `jaxcam.models`, such as a system of your own, or
             `jaxcam.discrepancy.terms.saved_classes()`.
 
     Returns:
         The system.
 
     Raises:
-        ValueError: The file is not a saved system, or names another class.
+        ValueError: The file is not a saved system, or contains an unknown class.
 
     Examples:
         >>> from jaxcam.models import BouncingBall, load_system, save_system
@@ -101,8 +101,8 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
         found = json.loads(file.read_text("utf-8"))
     except (ValueError, RecursionError):
         raise ValueError(
-            f"{file}: this is not JSON; give a file that `jaxcam fit` or `save_system` "
-            f"wrote."
+            f"{file}: this is not JSON; give a file written by `jaxcam fit` or "
+            f"`save_system`."
         ) from None
     try:
         return system_from_json(found, classes=classes)
@@ -113,7 +113,7 @@ def load_system(file: str | Path, *, classes: Iterable[type] = ()) -> HybridSyst
 def system_to_json(
     system: HybridSystem, *, about: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return a system as plain numbers, lists and words; see `save_system`.
+    """Return a system as plain numbers, lists and strings; see `save_system`.
 
     Args:
         system: The system.
@@ -132,23 +132,23 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
 
     Args:
         found: The parsed JSON.
-        classes: Additional classes, other than those of `jaxcam.models`, that may occur
-            in it.
+        classes: Classes that may occur in the description in addition to those of
+            `jaxcam.models`.
 
     Returns:
         The system.
 
     Raises:
-        ValueError: The description is invalid; the message gives the place.
+        ValueError: The description is invalid; the message gives the location.
     """
     if not isinstance(found, dict) or found.get("format") != _FORMAT:
         raise ValueError(
             f'this is not a saved system: it lacks "format": "{_FORMAT}"; give a file '
-            f"that `jaxcam fit` or `save_system` wrote."
+            f"written by `jaxcam fit` or `save_system`."
         )
     if found.get("version") != _VERSION:
         raise ValueError(
-            f"the file has the version {_short(found.get('version'))} and this program "
+            f"the file has version {_short(found.get('version'))}, but this program "
             f"reads {_VERSION}; update the program, or save the system again."
         )
     known = {cls.__name__: cls for cls in (*_KNOWN, *classes)}
@@ -187,7 +187,7 @@ def _encode(value: Any, place: str) -> Any:
         return value
     raise ValueError(
         f"`{place.lstrip('.')}` is a {type(value).__name__}, which cannot be saved; "
-        f"use a Module with numbers for it."
+        f"use a module with numbers for it."
     )
 
 
@@ -215,13 +215,13 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
     name = found["class"]
     if not isinstance(name, str) or name not in known:
         raise ValueError(
-            f"`{place}` is a {_short(name)}, which is not known; if it is a class of "
+            f"`{place}` is a {_short(name)}, which is unknown; if it is a class of "
             f"your own, pass it as classes=[...]."
         )
     cls = known[name]
     fields = {field.name: field for field in dataclasses.fields(cls)}
     given = found["fields"] if isinstance(found["fields"], dict) else {}
-    # fields that are newer than the file have their former meaning
+    # fields that are newer than the file have defaults that preserve its meaning
     spare = {name for name, field in fields.items() if field.metadata.get("spare")}
     for wrong in sorted((set(given) ^ set(fields)) - spare):
         what = "lacks" if wrong in fields else "has an unknown field"

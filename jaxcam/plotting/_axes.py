@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 
-# of the legend's font
+# in units of the font size of the legend
 _LETTERS_PER_INCH = 12.5
 
 
@@ -34,8 +34,8 @@ def several_axes(axes, shape: tuple[int, int], **layout) -> tuple[Figure, np.nda
     if axes.size != rows * columns:
         raise ValueError(
             f"This figure has {rows * columns} panels ({rows} rows, {columns} columns) "
-            f"and `axes` has {axes.size}; make them with "
-            f"`plt.subplots({rows}, {columns})` or leave `axes` out."
+            f"but `axes` has {axes.size}; create them with "
+            f"`plt.subplots({rows}, {columns})`, or omit `axes`."
         )
     axes = axes.reshape(shape)
     return axes[0, 0].figure, axes
@@ -47,7 +47,7 @@ def legend_above(ax: Axes) -> None:
     unique = dict(zip(labels, handles, strict=True))
     if unique:
         width = ax.get_window_extent().width / ax.figure.dpi
-        # line and space of an entry take the width of about six letters
+        # the line and spacing of an entry take the width of about six letters
         letters = sum(map(len, unique)) + 6 * len(unique)
         rows = 1 if letters <= _LETTERS_PER_INCH * width else 2
         ax.legend(

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from ..sweeps import Basins
 
 
-# attractors with a separate colour and legend entry
+# maximum number of attractors with a separate colour and legend entry
 _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
-# cells of a picture along its shorter side, at least
+# minimum number of cells of a picture along its shorter side
 _FINE = 500
-# neighbourhood of a small cell, in computed ones
+# size of the neighbourhood of a small cell, in computed cells
 _BLUR = 1.2
 _MARKS = "osD^vP*X"
 
@@ -41,10 +41,10 @@ def basin_picture(
     """Draw basins of attraction, one colour per attractor.
 
     Args:
-        basins: Basins from [`jaxcam.sweeps.basins`][]; components other than those of
-            `axes` must have one value.
+        basins: Basins from [`jaxcam.sweeps.basins`][]; components other than those in
+            `axes` must have only one value.
         ax: Axes to draw on; default a new figure.
-        axes: Components along x and y.
+        axes: Components to draw along x and y.
         orbits: Whether to mark the points of the attractors.
 
     Returns:
@@ -52,7 +52,7 @@ def basin_picture(
 
     Raises:
         ValueError: A component that is not drawn has several values, or one that is
-            drawn has one.
+            drawn has only one.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -67,8 +67,8 @@ def basin_picture(
     drawn = [grid.shape[i] for i in axes if i < len(grid.shape)]
     if len(drawn) < 2 or min(drawn) < 2 or any(grid.shape[i] > 1 for i in others):
         raise ValueError(
-            f"the grid is {grid.shape}; a picture needs several values of the two "
-            "components drawn, and one value of each other component"
+            f"the grid has shape {grid.shape}; a picture needs several values of "
+            "the two components drawn, and one value of each other component"
         )
     number = np.moveaxis(basins.attractor, axes, (0, 1)).reshape(
         grid.shape[axes[0]], grid.shape[axes[1]]
@@ -110,9 +110,9 @@ def basin_picture(
 def _finer(index, count: int) -> np.ndarray:
     """Refine the regions into smaller cells, to smooth slanting boundaries.
 
-    A small cell belongs to the region that has most of its neighbourhood. Where that
-    would change what was computed, at the centre of a cell, the cell stays as it was:
-    thin and fractal regions are not smoothed away.
+    A small cell is assigned to the region that covers most of its neighbourhood. If
+    that would change the computed result at the centre of a cell, the cell is not
+    refined, so thin and fractal regions are not smoothed away.
     """
     factor = -(-_FINE // min(index.shape))
     if factor == 1:
@@ -126,7 +126,7 @@ def _finer(index, count: int) -> np.ndarray:
             share = gaussian_filter(
                 (cells == region).astype(float), _BLUR * factor, mode="nearest"
             )
-            # inadmissible states, if more than all basins together
+            # inadmissible states, if there are more of them than in all basins together
             least = 0.5 if region == 0 else most
             finer = np.where(share > least, region, finer)
             most = np.where(share > least, share, most)
@@ -136,7 +136,9 @@ def _finer(index, count: int) -> np.ndarray:
 
 
 def _colours(basins, orbits: bool):
-    """Return colours by number, after that for no attractor, and the legend."""
+    """Return the colours of the attractors, followed by that for none, and the
+    legend.
+    """
     names = basins.names
     colours = [NOTHING, *COLOURS[: min(len(names), _SHOWN)]]
     shares = basins.shares

@@ -1,4 +1,4 @@
-"""Draw bifurcation diagrams of continued branches."""
+"""Draw bifurcation diagrams from continued branches."""
 
 from collections.abc import Callable, Iterable
 from itertools import groupby
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from continuation import Branch, Point
 
 
-# mark and colour of each kind of special point, in every figure
+# marker and colour of each kind of special point, in all figures
 _MARKS = {
     "fold": ("o", IMPACT),
     "flip": ("s", "#009E73"),
@@ -30,23 +30,23 @@ _MARKS = {
     "beginning of impacts": ("v", "#56B4E9"),
 }
 _OTHER = ("X", SECTION)
-# words next to the marks, where the kind has a long name
+# labels next to the markers, for kinds with a long name
 _SHORT = {
     "Neimark-Sacker": "NS",
     "interruption of chattering": "interruption",
     "beginning of impacts": "detachment",
 }
-# a word nearer than this to another is omitted (points)
+# a label closer than this to another one is omitted (points)
 _ROOM = 26, 11
 
 
 def mark_of(kind: str) -> tuple[str, str]:
-    """Mark and colour of a kind of special point."""
+    """Return the marker and colour of a kind of special point."""
     return _MARKS.get(kind, _OTHER)
 
 
 def word_of(kind: str) -> str:
-    """Name of a kind of special point in figures."""
+    """Return the name of a kind of special point in figures."""
     return str(_SHORT.get(kind, kind))
 
 
@@ -61,19 +61,20 @@ def branch_diagram(
     x_scale: float = 1.0,
     letters: bool = True,
 ) -> Figure:
-    """Draw branches: stable parts solid, unstable ones dashed, special points marked.
+    """Draw branches, with stable parts solid, unstable parts dashed and special points
+    marked.
 
     Args:
         branches: One or several branches from `continuation.branch`.
         ax: Axes to draw on; default a new figure.
-        value: Returns from each point the number, or several, drawn against the
-            parameter; default the first component of the state once per forcing period,
-            if the points have it, otherwise of their solution.
-        x_label: Name and unit of the x-axis; default the parameter's name.
+        value: Function that returns the value or values of a point to draw against the
+            parameter; by default, the first component of the states once per forcing
+            period, if the points have them, otherwise of the solution.
+        x_label: Name and unit of the x-axis; default the name of the parameter.
         y_label: Name and unit of the y-axis.
-        x_scale: Factor of the parameters (30/pi for a speed in rpm).
-        letters: Whether labels name the special points in addition to the legend; a
-            label that would cover another is omitted.
+        x_scale: Factor applied to the parameter (30/pi for a speed in rpm).
+        letters: Whether to label the special points in addition to the legend; a label
+            that would overlap another is omitted.
 
     Returns:
         The figure.
@@ -117,14 +118,16 @@ def _first_component(point) -> np.ndarray:
 
 
 def _draw(ax: Axes, branch, value, x_scale) -> None:
-    """Draw one line for each run of points of equal stability and signature."""
+    """Draw one line for each sequence of points with the same stability and
+    signature.
+    """
     points = [p for p in branch.points if p.converged]
     before = None
     for (_, stable), run in groupby(points, key=lambda p: (p.signature, _solid(p))):
         run = list(run)
         rows = [np.atleast_1d(np.asarray(value(p), dtype=float)) for p in run]
         width = len(rows[0])
-        # the lines of neighbouring runs meet
+        # the lines of neighbouring sequences meet
         if before is not None and len(before[1]) == width:
             run, rows = [before[0], *run], [before[1], *rows]
         before = (run[-1], rows[-1])
@@ -163,8 +166,8 @@ def _mark(ax: Axes, branch, value, x_scale) -> None:
 
 
 def _name(ax: Axes, points, value, x_scale) -> None:
-    """Write a word next to each mark, if there is room."""
-    # positions in the picture are those of the final limits
+    """Write a label next to each marker, if there is room."""
+    # positions in the figure depend on the final axis limits
     ax.autoscale_view()
     taken: list[np.ndarray] = []
     for point in points:

@@ -11,7 +11,7 @@ from ._style import CAM, IMPACT, styled
 
 @styled
 def cam_contour(contour: CamContour, ax: Axes | None = None) -> Figure:
-    """Draw a cam in its own frame, its axis, and its undercut parts.
+    """Draw a cam in its own frame, with its axis and its undercut parts.
 
     Args:
         contour: The contour over a full turn.

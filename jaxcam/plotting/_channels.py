@@ -3,7 +3,7 @@
 from .labels import labelled
 
 
-# endings of channel names and how their units are written; the longest ending wins
+# endings of channel names, and the notation of their units; the longest ending wins
 _ENDINGS = {
     "_rad_s2": "rad/s²",
     "_rad_s": "rad/s",

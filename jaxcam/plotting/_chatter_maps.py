@@ -18,9 +18,8 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
     Args:
         r: Coefficient of restitution.
         ax: Axes to draw on; default a new figure.
-        start: First values of lambda from which cobwebs are drawn; default one value on
-            either side of the fixed point, with complete and with interrupted
-            chattering.
+        start: Initial values of lambda for the cobwebs; by default, one value on each
+            side of the fixed point, with complete and with interrupted chatter.
 
     Returns:
         The figure.
@@ -71,15 +70,15 @@ def _cobweb(lam, r, most=40):
 def beta_lobes(
     r: float, ax: Axes | None = None, *, measured=None, lobes: int = 4
 ) -> Figure:
-    """Draw beta over lambda - lambda_bar, with its corners (thesis, Figures 6.14 and
+    """Draw beta against lambda - lambda_bar, with its corners (thesis, Figures 6.14 and
     6.15).
 
     Args:
         r: Coefficient of restitution.
         ax: Axes to draw on; default a new figure.
-        measured: Deviations of lambda and the beta found by simulation, drawn under the
-            theory.
-        lobes: Number of lobes, from the largest.
+        measured: Deviations of lambda and values of beta from simulations, drawn below
+            the theoretical curve.
+        lobes: Number of lobes, starting with the largest.
 
     Returns:
         The figure.
@@ -113,13 +112,13 @@ def beta_lobes(
 
 @styled
 def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figure:
-    """Draw the heights of lobes over their distance from the interruption (thesis,
+    """Draw the heights of lobes against their distance from the interruption (thesis,
     eq. 6.53).
 
     Args:
         distance: Distances, positive, shape `(k,)`.
         height: Heights, positive, shape `(k,)`.
-        kappa: Exponent of the theory.
+        kappa: Theoretical exponent.
         ax: Axes to draw on; default a new figure.
 
     Returns:
@@ -143,7 +142,7 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figu
     ax.loglog(
         distance, law, color=SECTION, ls="--", lw=1, label=rf"$\kappa$ = {kappa:.4f}"
     )
-    # over less than two decades the labels of minor ticks overlap
+    # over less than two decades, the labels of minor ticks overlap
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="distance from the interruption (–)", ylabel="height of the lobe (–)")
     legend_above(ax)

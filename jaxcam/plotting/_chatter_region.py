@@ -14,9 +14,9 @@ from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
 
 # share of white in the last curve of a family
 _LIGHTEST = 0.5
-# shorter parts of a curve (periods) are not labelled
+# parts of a curve shorter than this (periods) are not labelled
 _NAMED = 0.04
-# nor are curves this near to the axis (fraction of the picture's height)
+# nor are curves this close to the axis (fraction of the height of the figure)
 _LOWEST = 0.03
 
 
@@ -34,15 +34,15 @@ def chattering_picture(
     6.4).
 
     Args:
-        frame: From [`variational.chatter_frame`][].
-        region: From [`variational.chattering_region`][].
-        manifold: From [`variational.grazing_manifold`][].
+        frame: The frame from [`variational.chatter_frame`][].
+        region: The region from [`variational.chattering_region`][].
+        manifold: The manifold from [`variational.grazing_manifold`][].
         ax: Axes to draw on; default a new figure.
         period: Forcing period (s).
-        most: Largest speed drawn; default 1.3 times that of the region.
+        most: Largest speed to draw; default 1.3 times that of the region.
 
     Returns:
-        The figure: rebound speed over time from release, modulo the period.
+        The figure, with rebound speed against time from release, modulo the period.
 
     Examples:
         >>> import variational
@@ -64,7 +64,7 @@ def chattering_picture(
         speed[inside],
         color=BAND,
         lw=0,
-        label="D: chatter completes",
+        label="D: complete chatter",
     )
     ax.plot(
         time[inside] / period, speed[inside], color=SECTION, lw=1.4, label="C: its edge"
@@ -82,13 +82,13 @@ def chattering_picture(
 
 
 def _draw(ax, curves, release, period, colour, name):
-    """Draw curves from dark to light by their numbers, with labels."""
+    """Draw labelled curves in order of their numbers, from dark to light."""
     count = len(curves.time)
     for k, (time, speed) in enumerate(
         zip(np.asarray(curves.time), np.asarray(curves.speed), strict=True)
     ):
         shown = np.mod((time - release) / period + 0.75, 1.0) - 0.75
-        # a line does not join the two ends of the period, nor separate branches
+        # lines do not connect the two ends of the period or separate branches
         jump = np.abs(np.diff(shown)) > 0.05
         jump |= np.abs(np.diff(speed)) > 0.2 * np.nanmax(np.append(speed, 0.0))
         speed = np.array(speed)

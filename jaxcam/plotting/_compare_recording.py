@@ -35,28 +35,29 @@ def compare_recording(
 ) -> Figure:
     """Draw a recorded channel with its simulations, and the residuals below.
 
-    With a channel `cam_angle_rad` the horizontal axis counts turns of the cam,
-    otherwise it is time.
+    With a channel `cam_angle_rad`, the horizontal axis is in turns of the cam;
+    otherwise, it is time.
 
     Args:
         recording: The recording.
-        simulated: The channel as simulated at the samples of the recording, shape
-            `(k,)`, NaN where it was not; or a comparison that contains the recording;
-            or several of these by name.
+        simulated: The simulated channel at the samples of the recording, shape `(k,)`,
+            with NaN where it was not simulated; or a comparison that contains the
+            recording; or several of these, by name.
         axes: Two axes; default a new figure.
         channel: The channel to compare.
-        contact: Value of the channel in contact with the cam, shape `(k,)`; drawn as
+        contact: Value of the channel in contact with the cam, shape `(k,)`, drawn as
             the surface below the motion.
         noise: Standard deviation of a sample of the channel, in its unit; drawn as a
             +-2 sigma band.
-        turns: Number of turns of the cam to draw; without a cam, all is drawn.
+        turns: Number of turns of the cam to draw; without a cam, the entire recording
+            is drawn.
         start: Start time (s); default the first sample.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: A simulation has another length than the recording.
+        ValueError: A simulation does not have the same length as the recording.
 
     Examples:
         >>> from jaxcam.plotting import compare_recording
@@ -82,7 +83,8 @@ def compare_recording(
     above.plot(
         over[keep],
         samples[keep],
-        # wide and pale, so that it is visible behind a simulation that agrees with it
+        # wide and pale, so that it is visible behind a simulation that coincides with
+        # it
         color=RECORDED,
         linewidth=4.5,
         label="recorded",
@@ -132,13 +134,13 @@ def _fitting(recording: Recording, values: ArrayLike) -> np.ndarray:
 
 
 def _horizontal(recording: Recording, turns: float, start: float | None):
-    """Return horizontal positions, the samples drawn, and the label."""
+    """Return the horizontal positions, the samples to draw, and the axis label."""
     first = 0 if start is None else int(np.searchsorted(recording.time, start))
     later = np.arange(len(recording)) >= first
     if "cam_angle_rad" not in recording.channels:
         return recording.time, later, labelled("time", "s")
     turned = recording["cam_angle_rad"] / (2 * np.pi)
-    # the cam angle grows or falls with the sense of rotation
+    # the cam angle increases or decreases depending on the sense of rotation
     turned = turned if turned[-1] >= turned[0] else -turned
     begin = turned[min(first, len(turned) - 1)]
     return turned - np.floor(begin), later & (turned - begin <= turns), "cam (turns)"

@@ -13,14 +13,14 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 
 
-# the background of mkdocs-material's dark pages, and its text
+# the background and text colours of dark pages in mkdocs-material
 _BACKGROUND = np.array([0x1E, 0x21, 0x29]) / 255
 _TEXT = np.array([0.92, 0.92, 0.94])
-# colours are lightened by this much: pure blue is hard to see on black
+# colours are lightened by this amount, because pure blue is hard to see on black
 _LIGHTER = 0.25
-# spread of the channels above which a colour is not grey
+# difference between the channels above which a colour is not grey
 _COLOURFUL = 0.25
-# properties of an artist that hold a colour
+# properties of an artist that contain a colour
 _PROPERTIES = {
     Line2D: ("color", "markerfacecolor", "markeredgecolor"),
     Patch: ("edgecolor", "facecolor"),
@@ -30,7 +30,7 @@ _PROPERTIES = {
 
 
 def on_dark(figure: Figure) -> Figure:
-    """Recolour a figure for a dark page: greys are inverted, colours lightened.
+    """Recolour a figure for a dark page: greys are inverted and colours lightened.
 
     The figure is changed in place; save the light version first.
 
@@ -44,7 +44,7 @@ def on_dark(figure: Figure) -> Figure:
         >>> from jaxcam.plotting import lambda_cobweb, on_dark
         >>> drawn = on_dark(lambda_cobweb(0.5))
     """
-    # ticks are made when a figure is drawn
+    # ticks are created when a figure is drawn
     figure.canvas.draw()
     for artist in figure.findobj():
         if isinstance(artist, Axes):
@@ -75,7 +75,7 @@ def dark(colours: np.ndarray) -> np.ndarray:
 
 
 def _recolour(artist, names: tuple[str, ...]) -> None:
-    # read all colours before setting any: setting one may change another
+    # all colours are read before any is set, because setting one may change another
     colours = {name: getattr(artist, f"get_{name}")() for name in names}
     for name, colour in colours.items():
         if isinstance(colour, str) and colour in ("none", "auto"):
@@ -97,7 +97,7 @@ def _recolour_values(artist: ScalarMappable) -> None:
 
 
 def _recolour_ticks(axes: Axes) -> None:
-    # also for ticks that are made later
+    # also for ticks that are created later
     for axis in (axes.xaxis, axes.yaxis):
         parameters = axis.get_tick_params()
         found = {

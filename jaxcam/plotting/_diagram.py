@@ -1,4 +1,4 @@
-"""Draw brute-force bifurcation diagrams, and charts over two parameters."""
+"""Draw brute-force bifurcation diagrams, and charts in two parameters."""
 
 from typing import TYPE_CHECKING
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from ..sweeps import Chart, Diagram
 
 
-# each value by itself, upwards, downwards
+# each value separately, upwards, downwards
 _WAYS = {0: (SECTION, ""), 1: (FLIGHT, "upwards"), -1: (IMPACT, "downwards")}
 COLOURS = (
     "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
     "#8C8C8C", "#004D7A", "#A6D8F5", "#8A5F00", "#7FD1B9", "#7A3F62", "#F4B183",
 )  # fmt: skip
-"""Colours of Okabe and Ito, then lighter colours, for large numbers of items."""
-# resolution of a diagram in height
+"""Okabe-Ito colours, followed by lighter colours for large numbers of items."""
+# vertical resolution of a diagram
 _ROWS = 600
 # smallest and largest dots (points)
 _DOTS = 0.6, 2.4
@@ -44,16 +44,17 @@ def sweep_diagram(
     y_label: tuple[str, str] | None = None,
     x_scale: float = 1.0,
 ) -> Figure:
-    """Draw a bifurcation diagram over the parameter, darker where samples are frequent.
+    """Draw a bifurcation diagram, darker where there are many samples.
 
-    Dots are drawn as an image, so that millions of them stay a small file.
+    Dots are drawn as an image, so that the file remains small even with millions of
+    them.
 
     Args:
-        diagram: From [`jaxcam.sweeps.diagram`][].
+        diagram: The diagram from [`jaxcam.sweeps.diagram`][].
         ax: Axes to draw on; default a new figure.
         component: Component of the state to draw.
-        phase: Draw the phase (in periods) of each sample instead, for sections that are
-            not sampled once per period.
+        phase: Whether to draw the phase (in periods) of each sample instead, for
+            sections that are not sampled once per period.
         x_label: Name and unit of the x-axis.
         y_label: Name and unit of the y-axis.
         x_scale: Factor of the parameters (30/pi for a speed in rpm).
@@ -90,7 +91,7 @@ def sweep_diagram(
     for way in ways:
         colour, word = _WAYS[way]
         some = diagram.direction == way
-        # if both directions give the same, the larger dots remain visible
+        # if both directions give the same result, the larger dots remain visible
         larger = 1.5 if way == 1 and len(ways) > 1 else 1.0
         size = larger * _dot_size(ax, int(np.sum(some)))
         _dots(ax, x[some], y[some], colour, size, 2 if way >= 0 else 3)
@@ -109,7 +110,7 @@ def sweep_diagram(
 
 
 def _dot_size(ax: Axes, columns: int) -> float:
-    """Return the diameter of a dot (points): the distance of the columns, within
+    """Return the diameter of a dot (points): the distance between columns, within
     limits.
     """
     width = ax.get_window_extent().width * 72 / ax.figure.dpi
@@ -117,10 +118,10 @@ def _dot_size(ax: Axes, columns: int) -> float:
 
 
 def _dots(ax: Axes, x, y, colour: str, size: float, zorder: float) -> None:
-    """Draw a dot at each height with samples, darker for many samples.
+    """Draw a dot at each height with samples, darker where there are many.
 
-    `x` and `y` have the shape `(columns, starts, keep)`. A single sample remains
-    visible, and a periodic motion has full darkness.
+    `x` and `y` have shape `(columns, starts, keep)`. A single sample remains visible,
+    and a periodic motion is fully dark.
     """
     finite = np.isfinite(y)
     if not np.any(finite):
@@ -154,10 +155,10 @@ def sweep_chart(
     x_scale: float = 1.0,
     y_scale: float = 1.0,
 ) -> Figure:
-    """Draw the labels of a chart, one colour per label.
+    """Draw the labels of a chart, with one colour per label.
 
     Args:
-        chart: From [`jaxcam.sweeps.chart`][].
+        chart: The chart from [`jaxcam.sweeps.chart`][].
         ax: Axes to draw on; default a new figure.
         start: Index of the start, if there are several.
         x_label: Name and unit of the first parameter.
@@ -179,7 +180,7 @@ def sweep_chart(
     ax = one_axes(ax)
     labels = chart.labels[..., start].astype(str)
     known, counts = np.unique(labels, return_counts=True)
-    # the most frequent labels get the most distinct colours
+    # the most frequent labels have the most distinct colours
     known = known[np.argsort(-counts, kind="stable")]
     number = np.argmax(labels[..., None] == known, axis=-1)
     shown = min(len(known), len(COLOURS))

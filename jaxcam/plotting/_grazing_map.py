@@ -24,13 +24,13 @@ def cobweb(
     """Draw a map, the diagonal, and the cobweb of one orbit.
 
     Args:
-        function: The map, of a vector of points, such as
-            `lambda x: variational.nordmark_map(x, mu, lam)`.
+        function: The map, a function of a vector of points, such as `lambda x:
+            variational.nordmark_map(x, mu, lam)`.
         start: First point of the orbit.
-        turns: Number of iterations drawn.
+        turns: Number of iterations to draw.
         ax: Axes to draw on; default a new figure.
-        skip: Number of iterations before that.
-        edge: Value at which impacts begin, marked by a dashed line.
+        skip: Number of initial iterations that are not drawn.
+        edge: Value at which impacts begin, which is marked by a dashed line.
         name: Name of the variable, in TeX.
 
     Returns:

@@ -1,4 +1,6 @@
-"""Draw each impact against the previous impact: phase (or time) and speed."""
+"""Draw phase (or time) and speed of each impact against those of the previous
+impact.
+"""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -14,7 +16,7 @@ from .curves import Hits, hits, window
 from .labels import labelled, speed_unit, time_unit
 
 
-# speeds that differ by more than this factor are drawn on a logarithmic scale
+# if speeds differ by more than this factor, the scale is logarithmic
 _MANY_SCALES = 1e3
 
 
@@ -29,15 +31,15 @@ def impact_return_map(
 ) -> Figure:
     """Draw impact k+1 against impact k, with the diagonal.
 
-    The first panel shows the impact times, the second the approach speeds
-    (the normal speed just before). Points on the diagonal are repeating impacts.
+    The first panel shows the impact times, the second the approach speeds (the normal
+    speeds just before the impacts). Points on the diagonal are repeating impacts.
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
         axes: Two axes; default a new figure.
-        against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), "time" for
-            the time itself (s), which is also drawn without a period.
-        period: Forcing period (s); default the system's own.
+        against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), or "time"
+            for the time itself (s), which is also used if there is no period.
+        period: Forcing period (s); default: that of the system.
         between: Time span to draw (s), for example without a transient.
 
     Returns:
@@ -86,7 +88,7 @@ def _draw(ax: Axes, system, values, found: Hits, name: str, unit: str, limits) -
     this, following = values[:-1], values[1:]
     kinds = np.unique(found.constraint)
     for k in kinds:
-        # the constraint that the later of the two impacts hits
+        # the constraint hit by the later of the two impacts
         chosen = found.constraint[1:] == k
         ax.plot(
             this[chosen],

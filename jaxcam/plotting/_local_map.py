@@ -1,4 +1,4 @@
-"""Draw the local map of thesis section 5.4 with its cobwebs."""
+"""Draw the local map of the thesis (section 5.4) with cobwebs."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,15 +20,15 @@ def local_map(
     shift: float = 0.0,
     turns: int = 60,
 ) -> Figure:
-    """Draw the fitted map over the simulated map, with a cobweb (thesis, Figures 5.25,
+    """Draw the fitted and the simulated map, with a cobweb (thesis, Figures 5.25 and
     5.26).
 
     Args:
-        local: From [`variational.fit_local_map`][].
-        lobes: The simulated lobes, drawn as dots and only without a shift.
+        local: The fitted map from [`variational.fit_local_map`][].
+        lobes: The simulated lobes, drawn as dots, but only if there is no shift.
         ax: Axes to draw on; default a new figure.
-        shift: Distance by which the map is shifted to the left, the effect of a
-            parameter.
+        shift: Distance by which the map is shifted to the left, representing the effect
+            of a parameter.
         turns: Number of iterations of the cobweb, the first half of which is not drawn.
 
     Returns:
@@ -43,7 +43,7 @@ def local_map(
     ax = one_axes(ax)
     x_0, x_inf = float(local.x_0), float(local.x_inf)
     span = x_0 - x_inf
-    # dense at every corner: equal steps of the depth, then of the root
+    # dense at every corner: equal steps in the depth, then in the root
     x = np.unique(
         np.concatenate(
             [
@@ -62,7 +62,7 @@ def local_map(
             label="measured",
             zorder=3,
         )
-    # the fit describes the first lobe and those inside it
+    # the fit is valid for the first lobe and those inside it
     shown = np.asarray(local(jnp.asarray(x)))
     ax.plot(x - shift, shown, color=FLIGHT, lw=1.2, label="fitted")
     ends = np.array([x[0] - shift, x[-1] - shift])

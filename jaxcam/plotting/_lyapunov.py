@@ -34,7 +34,7 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
     running = np.asarray(spectrum.running)
     if running.ndim != 2:
         raise ValueError(
-            f"this spectrum has {running.shape[0]} lanes; pass one of them, such as "
+            f"this spectrum has {running.shape[0]} motions; pass one of them, such as "
             "jax.tree.map(lambda a: a[0], spectrum)"
         )
     ax = one_axes(ax)
@@ -52,7 +52,7 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
                 last - error, last + error, color=line.get_color(), alpha=0.2, lw=0
             )
     ax.set_xlim(0, time[-1])
-    ax.set_xlabel("time averaged over (s)")
+    ax.set_xlabel("averaging time (s)")
     ax.set_ylabel("Lyapunov exponent (1/s)")
     legend_above(ax)
     return figure_of(ax)

@@ -1,4 +1,4 @@
-"""Draw a cam's motion program: s, v, a and j over a turn."""
+"""Draw the motion program of a cam: s, v, a and j over a turn."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,9 +17,9 @@ _POINTS = 200
 def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
     """Draw lift, velocity, acceleration and jerk, per radian of the cam.
 
-    At a jump of a derivative the curve is broken: the values on both sides are joined
-    by a dashed line. A jump of the derivative before it, which is a pulse of unbounded
-    height, is not drawn.
+    At a jump of a derivative, the curve is broken, and the values on both sides are
+    connected by a dashed line. The infinite pulse that results from a jump of the next
+    lower derivative is not drawn.
 
     Args:
         program: The motion program.

@@ -14,14 +14,14 @@ from ._style import BAND, FLIGHT, IMPACT, styled
 def multipliers(
     values: Sequence | np.ndarray, ax: Axes | None = None, *, reach: float | None = None
 ) -> Figure:
-    """Draw multipliers of one orbit, or of many, and the unit circle.
+    """Draw the multipliers of one or many orbits, with the unit circle.
 
     Args:
         values: Multipliers, complex, shape `(n,)`, or `(orbits, n)` for the orbits of a
             branch.
         ax: Axes to draw on; default a new figure.
-        reach: Half the width of the picture; default such that all fit in. Multipliers
-            beyond it are marked at the edge.
+        reach: Half the width of the figure; by default, all multipliers are inside.
+            Multipliers beyond it are marked at the edge.
 
     Returns:
         The figure.
@@ -45,7 +45,7 @@ def multipliers(
     kinds = (
         ("stable", (np.abs(values) < 1) & ~outside, "o", FLIGHT),
         ("unstable", (np.abs(values) >= 1) & ~outside, "s", IMPACT),
-        ("outside the picture", outside, "X", IMPACT),
+        ("outside the figure", outside, "X", IMPACT),
     )
     for name, chosen, marker, colour in kinds:
         if np.any(chosen):

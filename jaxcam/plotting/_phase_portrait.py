@@ -24,16 +24,16 @@ def phase_portrait(
 ) -> Figure:
     """Draw a trajectory in the plane of two state components.
 
-    Flights and contacts are lines of different colour, jumps at impacts are thin and
-    dashed, and the stroboscopic points, one per period, are dots.
+    Flights and contacts are lines of different colours, jumps at impacts are thin
+    dashed lines, and the stroboscopic points, one per period, are dots.
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
         ax: Axes to draw on; default a new figure.
-        components: Components along x and y.
-        period: Time between stroboscopic points (s); default the forcing period, and no
-            points for a system without one.
-        phase: Time from t0 to one of these points (s).
+        components: Components to draw along x and y.
+        period: Time between stroboscopic points (s); default the forcing period;
+            without either, no points are drawn.
+        phase: Time from `t0` to one of these points (s).
         between: Time span to draw (s); default the entire trajectory.
         samples: Number of points of a curve, in addition to those that short flights
             need.
@@ -61,7 +61,7 @@ def phase_portrait(
             markersize=5,
             markeredgecolor="white",
             markeredgewidth=0.6,
-            label="once a period",
+            label="once per period",
             zorder=4,
         )
     ax.set_xlabel(state_label(trajectory.system, components[0]))
@@ -83,9 +83,9 @@ def _draw_motion(ax: Axes, drawn: Curve, right: int, up: int) -> None:
 
 
 def _resting(drawn: Curve) -> np.ndarray:
-    """Return the states of contacts that are points, as on a floor at rest.
+    """Return the states of contacts that are single points, as on a floor at rest.
 
-    A line through equal points cannot be seen.
+    A line through equal points would not be visible.
     """
     size = np.nanmax(drawn.state, axis=0) - np.nanmin(drawn.state, axis=0)
     ends = np.flatnonzero(np.isnan(drawn.time))
@@ -120,7 +120,7 @@ def _stroboscopic(trajectory, period, phase, between) -> np.ndarray:
         return np.empty((0, 0))
     start, stop = window(trajectory, between)
     first, period = float(trajectory.t0) + phase, float(period)
-    # keeps a point at the end of the span despite rounding
+    # keep a point at the end of the span in spite of rounding
     count = np.floor(np.array([first - start, stop - first]) / period + 1e-9)
     times = first + period * np.arange(-count[0], count[1] + 1)
     if not len(times):

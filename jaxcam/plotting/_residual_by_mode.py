@@ -1,4 +1,4 @@
-"""Draw residuals of a model in flight, in contact and at the impacts."""
+"""Draw the residuals of a model in flight, in contact and at impacts."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -18,7 +18,7 @@ from ._style import BAND, FLIGHT, styled
 from .labels import labelled
 
 
-# odd, so that one of them is about zero
+# odd, so that one of the bins is centred at zero
 _BINS = 37
 _ANGLE_TICKS = ("0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$")
 
@@ -33,22 +33,22 @@ def residual_by_mode(
 ) -> Figure:
     """Draw recording minus model, one row for each mode and channel.
 
-    The left panel shows the residuals with a grey +-2 sigma band of the noise, the
-    right panel their histogram (bars), and that of the noise alone (black line).
-    Impacts carry their standard errors.
+    The left panel shows the residuals with a grey +-2 sigma band of the noise; the
+    right panel shows their histogram (bars) and that of the noise alone (black line).
+    Impacts have error bars of their standard errors.
 
     Args:
-        comparison: From `jaxcam.recordings.compare` or `compare_case`.
+        comparison: The comparison from `jaxcam.recordings.compare` or `compare_case`.
         axes: Two axes for each mode and channel, row by row; default a new figure.
-        record: Name of the only recording to draw; default all, each in its own colour.
-        against: "time" (s), or "phase" for the angle of the cam within its turn (rad).
+        record: Name of a single recording to draw; default all, each in its own colour.
+        against: "time" (s), or "phase" for the cam angle within one turn (rad).
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: There is nothing to draw, no cam to take the phase of, or `against`
-            is unknown.
+        ValueError: There is nothing to draw, there is no cam for the phase, or
+            `against` is unknown.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -83,11 +83,13 @@ def residual_by_mode(
     if len(names) > 1:
         _name_records(figure, colours)
     left, right = grid[-1]
-    left.set_xlabel("time (s)" if against == "time" else "cam angle in its turn (rad)")
+    left.set_xlabel(
+        "time (s)" if against == "time" else "cam angle within one turn (rad)"
+    )
     right.set_xlabel("share (%)")
     grid[0, 1].set_title("line: noise alone", fontsize="small")
-    # for all rows; next to a large residual the noise fills one bin, which may be cut
-    # off
+    # for all rows; compared with a large residual, the noise fills one bin, which may
+    # be truncated
     right.set_xlim(0.0, 1.25 * highest)
     if against == "phase":
         left.set_xticks(np.arange(5) * np.pi / 2, _ANGLE_TICKS)
@@ -96,7 +98,7 @@ def residual_by_mode(
 
 
 def _groups(comparison: Comparison, record: str | None) -> list[list[Residuals]]:
-    """Return residuals by mode and channel, in the order of the comparison."""
+    """Return the residuals of each mode and channel, in the order of the comparison."""
     groups: dict[tuple[str, str], list[Residuals]] = {}
     for part in comparison.residuals:
         if record in (None, part.record) and len(part.value):
@@ -158,7 +160,7 @@ def _draw_part(ax: Axes, part: Residuals, factor, colour, against) -> None:
             label=part.record,
         )
         return
-    # thousands of dots make a vector file large and slow
+    # thousands of dots would make a vector file large and slow
     ax.plot(
         place,
         factor * part.value,
@@ -192,7 +194,8 @@ def _draw_shares(
 
 
 def _name_records(figure: Figure, colours: dict[str, str]) -> None:
-    # the titles are above the axes, so the recordings are named above them all
+    # the titles are above the axes, so the names of the recordings are above all of
+    # them
     dots = [
         Line2D([], [], marker="o", linestyle="", color=colour, label=name)
         for name, colour in colours.items()

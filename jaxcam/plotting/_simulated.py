@@ -1,4 +1,4 @@
-"""Evaluate the model at the samples of a recording."""
+"""Obtain the simulated values at the samples of a recording."""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,10 +10,9 @@ from ..recordings.against_model import Comparison
 def simulated_channel(
     comparison: Comparison, recording: Recording, channel: str
 ) -> Float[np.ndarray, " k"]:
-    """Return the simulated channel at the samples of the recording.
+    """Return the simulated channel at the samples of the recording; NaN elsewhere.
 
-    A comparison contains differences only at samples in flight and in contact; the
-    other samples are NaN.
+    A comparison contains the differences in flight and in contact, each at its sample.
 
     **Raises:** `ValueError` if the recording is not in the comparison.
     """

@@ -30,8 +30,8 @@ def special_curves(
 ) -> Figure:
     """Draw curves of special points in the plane of two parameters.
 
-    Each kind of point has the same colour as on a branch. Points of codimension two
-    on the curves, and crossings with other curves found there, are marked and named.
+    Each kind of point has the same colour as on a branch. Points of codimension two on
+    the curves, and crossings with other curves that were found, are marked and named.
 
     Args:
         curves: One or several curves from `continuation.curve`, all in the same
@@ -39,14 +39,14 @@ def special_curves(
         ax: Axes to draw on; default a new figure.
         x_label: Name and unit of the first parameter; default its name.
         y_label: Name and unit of the second parameter; default its name.
-        x_scale: Factor of the first parameter (30/pi for a speed in rpm).
-        y_scale: Factor of the second parameter.
+        x_scale: Factor applied to the first parameter (30/pi for a speed in rpm).
+        y_scale: Factor applied to the second parameter.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: A branch is in one parameter only.
+        ValueError: A branch is in only one parameter.
 
     Examples:
         >>> import continuation
@@ -66,7 +66,7 @@ def special_curves(
     for curve in several:
         if len(curve.names) != 2:
             raise ValueError(
-                "a chart needs curves in two parameters; give branches made by "
+                "a chart needs curves in two parameters; give branches from "
                 "continuation.curve"
             )
         kind = _kind(curve)

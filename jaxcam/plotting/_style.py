@@ -1,4 +1,4 @@
-"""Define one style for all figures, and the meaning of its colours."""
+"""The common style of all figures, and the meaning of its colours."""
 
 import functools
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 _STYLE_FILE = Path(__file__).with_name("jaxcam.mplstyle")
 
-# colours of Okabe and Ito, by their meaning in every figure
+# Okabe-Ito colours, with their meaning in all figures
 FLIGHT = "#0072B2"
 IMPACT = "#D55E00"
 CONTACT = "#E69F00"
@@ -34,7 +34,7 @@ def gap_colour(number: int) -> str:
 
 
 def style():
-    """Return a context in which figures follow the project's style.
+    """Return a context in which figures have the style of the project.
 
     Returns:
         A context manager.
@@ -48,7 +48,7 @@ def style():
 
 
 def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Draw in the project's style without changing the user's settings."""
+    """Draw in the style of the project without changing the user's settings."""
 
     @functools.wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -59,9 +59,10 @@ def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write a figure to a file, in the style's resolution, and close it.
+    """Write a figure to a file, in the resolution of the style, and close it.
 
-    The folder is created if it does not exist; the suffix of the name sets the format.
+    The folder is created if it does not exist; the suffix of the name determines the
+    format.
 
     Args:
         figure: The figure.

@@ -88,7 +88,8 @@ def _draw_component(ax: Axes, drawn: Curve, component: int) -> None:
 def _draw_gap(ax: Axes, drawn: Curve, system: HybridSystem) -> None:
     number = drawn.gap.shape[1]
     for k in range(number):
-        # one constraint needs no name, several are distinguished by the colour cycle
+        # a single constraint needs no name; several are distinguished by the colour
+        # cycle
         one = number == 1
         label = None if one else system.constraint_name(k)
         colour = FLIGHT if one else gap_colour(k)
@@ -112,6 +113,6 @@ def _shade(ax: Axes, drawn: Curve) -> None:
 
 
 def _narrow(label: str) -> str:
-    # a panel is lower than many labels are long
+    # the height of a panel is less than the length of many labels
     name, _, unit = label.rpartition(" (")
     return f"{textwrap.fill(name, 17)}\n({unit}"

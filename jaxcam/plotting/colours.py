@@ -1,4 +1,4 @@
-"""Meaning of the colours in all figures, for figures drawn elsewhere."""
+"""The meaning of the colours in all figures, for use in other figures."""
 
 from ._style import (
     BAND as BAND,

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from ..hybrid import Trajectory
 
 
-# points in a flight that is shorter than the even sampling
+# number of points in a flight that is shorter than the sampling interval
 _SHORT_FLIGHT = 8
 _POINTS_IN_STEP = 4
 
@@ -16,8 +16,8 @@ _POINTS_IN_STEP = 4
 class Curve(NamedTuple):
     """The curve of a trajectory between two times.
 
-    A row of NaN ends every flight and every contact, so that a line through the rows
-    shows no jump; jumps are stored separately.
+    Every flight and every contact ends with a row of NaN, so that a line through the
+    rows does not show jumps; jumps are stored separately.
     """
 
     time: Float[np.ndarray, " k"]
@@ -91,7 +91,9 @@ def hits(trajectory: Trajectory, start: float, stop: float) -> Hits:
 def contact_spans(
     trajectory: Trajectory, start: float, stop: float
 ) -> Float[np.ndarray, "contacts 2"]:
-    """Return start and end of every contact that overlaps the span, cut to it."""
+    """Return the start and end of every contact that overlaps the span, restricted to
+    it.
+    """
     contacts = trajectory.contacts
     spans = np.stack([np.asarray(contacts.start), np.asarray(contacts.end)], axis=1)
     spans = spans[: int(contacts.count)].clip(start, stop)
@@ -150,9 +152,9 @@ def trajectory_curve(
 
 
 def _points(trajectory: Trajectory, knots, samples: int) -> list[int]:
-    """Return the points of the piece between each two knots."""
+    """Return the number of points in each piece between two knots."""
     even = np.ceil(samples * np.diff(knots) / (knots[-1] - knots[0])) + 1
-    # a long run oscillates between two even samples; its steps follow every oscillation
+    # a long run may oscillate between two samples; its steps follow every oscillation
     steps = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
     follows = _POINTS_IN_STEP * np.diff(np.searchsorted(steps, knots))
     return np.maximum(np.maximum(even, follows), _SHORT_FLIGHT).astype(int).tolist()

@@ -1,4 +1,4 @@
-"""Return axis labels: a name and a unit for every quantity of a system."""
+"""Axis labels, with the name and unit of each quantity of a system."""
 
 from ..hybrid import HybridSystem
 from ..tables import scaled as scaled
@@ -18,7 +18,7 @@ def labelled(name: str, unit: str) -> str:
 
 
 def state_label(system: HybridSystem, component: int) -> str:
-    """Label of one component of the state."""
+    """Return the label of one component of the state."""
     names, units = system.state_names, system.state_units
     name = names[component] if component < len(names) else f"$x_{{{component + 1}}}$"
     unit = units[component] if component < len(units) else "-"
@@ -40,7 +40,7 @@ def gap_label(system: HybridSystem) -> str:
 
 
 def time_unit(system: HybridSystem) -> str:
-    """Return s, or - for a system with dimensionless states only."""
+    """Return s, or - for a system with only dimensionless states."""
     units = system.state_units
     return "-" if units and all(unit in ("-", "") for unit in units) else "s"
 

@@ -1,4 +1,4 @@
-"""Compute bifurcation diagrams, charts and basins of attraction of many motions."""
+"""Compute bifurcation diagrams, charts and basins of attraction from many motions."""
 
 from ._basins import basins as basins
 from ._basins_result import Basins as Basins

@@ -1,4 +1,4 @@
-"""Basins of attraction: which states end on which attractor."""
+"""Basins of attraction: which states lead to which attractor."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -32,34 +32,34 @@ def basins(
     progress: Callable[[Progress], None] | None = None,
     block: int | None = None,
 ) -> Basins:
-    """Compute basins of attraction: the attractor on which each state of a grid ends.
+    """Compute basins of attraction: the attractor to which each state of a grid leads.
 
     Motions are simulated and sampled once per period. Periodic motions are on the same
-    attractor if their orbits agree, other motions if they visit common cells. The
-    result does not depend on the order of states, on blocks, or on the executor.
+    attractor if their orbits are equal, other motions if they visit common cells. The
+    result does not depend on the order of the states, on the blocks or on the executor.
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.
-        grid: A [`jaxcam.sweeps.Grid`][] of initial states; those behind the constraint
-            are left out.
+        grid: A [`jaxcam.sweeps.Grid`][] of initial states; those behind a constraint
+            are omitted.
         turns: Number of periods simulated.
-        keep: Number of samples used; periods up to `keep / 2` are detected.
+        keep: Number of final samples used; periods up to `keep / 2` are detected.
         period_tolerance: Tolerance for detecting periods.
-        same: Orbits that differ by less, in units of `scale`, count as the same
-            attractor.
-        reruns: Number of extensions of non-periodic runs, each twice as long as the one
-            before.
+        same: Orbits that differ by less than this, in units of `scale`, count as the
+            same attractor.
+        reruns: Number of extensions of non-periodic runs, each twice as long as the
+            previous one.
         scale: Scale of the motions, shape `(n,)`; default the largest extent or
             coordinate of the grid, or the scale of `known`. It matters for a grid that
             is small compared with the attractors.
-        known: Basins of the same system whose attractors keep their numbers here, for
+        known: Basins of the same system whose attractor numbers are to be kept, for
             example when zooming in.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
-        block: Rows of the grid's first component computed together.
+        block: Number of rows along the first component of the grid computed together.
 
     Returns:
         [`jaxcam.sweeps.Basins`][].
@@ -79,8 +79,8 @@ def basins(
     check_turns(turns, keep, period_tolerance, reruns)
     if not section.regular:
         raise ValueError(
-            f"basins need a section that is sampled once per period; a "
-            f"{type(section).__name__} is not, so pass the system itself"
+            f"basins need a section that is sampled once per period, and a "
+            f"{type(section).__name__} is not; pass the system itself"
         )
     if not 0 < same < 1:
         raise ValueError(f"same is {same:g}; give a number in (0, 1), such as 1e-3")

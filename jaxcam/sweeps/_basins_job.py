@@ -13,7 +13,7 @@ from .sections import AbstractSection
 
 
 _FINE = 1 / 64
-"""Extent of the cells by which motions that do not repeat are distinguished."""
+"""Extent of the cells used to distinguish non-periodic motions."""
 
 
 class BasinsJob(AbstractJob):
@@ -44,7 +44,7 @@ class BasinsJob(AbstractJob):
             "fingerprint": StoredVariable(
                 (*dims, "mean"), (*tail, fingerprint_size(n)), "float64"
             ),
-            # zero for periodic motions, which compresses well on disk
+            # zero for periodic motions, which compresses well
             "cells": StoredVariable((*dims, "sample"), (*tail, keep), "int64"),
         }
         coordinates = {

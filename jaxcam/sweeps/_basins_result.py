@@ -1,4 +1,4 @@
-"""Represent basins of attraction and their properties."""
+"""Basins of attraction and their properties."""
 
 import json
 from typing import NamedTuple
@@ -11,22 +11,22 @@ from .blocks import SWEEP
 
 
 class Share(NamedTuple):
-    """Fraction of the states that end on an attractor, and its standard error."""
+    """Fraction of the states that lead to an attractor, and its standard error."""
 
     share: float
     """The fraction, from 0 to 1."""
     stderr: float
-    """Its standard error."""
+    """Standard error of the fraction."""
 
 
 class Basins:
     """The result of [`jaxcam.sweeps.basins`][].
 
-    `dataset` has one dimension for each component of the state, and `attractor` (the
-    number of the one that each state ends on, -1 if it escapes to infinity, -2 if it
-    failed, -3 if it cannot start), `impacts` and `turns` (see
-    [`jaxcam.sweeps.attractors.Labels`][]); along `number`, the attractors: `name` and
-    `orbit`.
+    `dataset` has one dimension for each component of the state, with the variables
+    `attractor` (the number of the attractor to which each state leads, -1 if the motion
+    escapes to infinity, -2 if it failed, -3 if it cannot start), `impacts` and `turns`
+    (see [`jaxcam.sweeps.attractors.Labels`][]). Along the dimension `number` are the
+    `name` and `orbit` of each attractor.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -67,17 +67,19 @@ class Basins:
 
     @property
     def scale(self) -> np.ndarray:
-        """Scale of the motions, in whose units orbits are compared, shape `(n,)`."""
+        """Scale of the motions, to which differences of orbits are relative, shape
+        `(n,)`.
+        """
         return np.array(json.loads(self.dataset.attrs[SWEEP])["scale"])
 
     @property
     def shares(self) -> dict[str, Share]:
-        """Fraction of the admissible states that ends on each attractor (basin
+        """Fraction of the admissible states that leads to each attractor (basin
         stability).
 
-        The standard error sqrt(p (1 - p) / N) is that of states drawn at random (Menck
-        et al., Nature Physics 9, 2013); for a grid it is an upper bound where basins
-        are larger than its cells.
+        The standard error sqrt(p (1 - p) / N) is that for states drawn at random (Menck
+        et al., Nature Physics 9, 2013). For a grid, it is an upper bound if the basins
+        are larger than the cells.
         """
         number = self.attractor
         number = number[number != -3]

@@ -1,4 +1,4 @@
-"""Measure the mixing of basins, and the roughness of their boundary."""
+"""Measure how basins are mixed, and how rough their boundary is."""
 
 from typing import NamedTuple
 
@@ -9,13 +9,13 @@ class BasinEntropy(NamedTuple):
     """Basin entropy and boundary basin entropy (nats)."""
 
     entropy: float
-    """Average over all boxes (nats)."""
+    """Average entropy of all boxes (nats)."""
     boundary_entropy: float
-    """Average over the boxes that contain a boundary (nats)."""
+    """Average entropy of the boxes that contain a boundary (nats)."""
 
     @property
     def fractal(self) -> bool:
-        """Return whether the boundary must be fractal: boundary entropy above ln 2."""
+        """Return whether the boundary must be fractal (boundary entropy above ln 2)."""
         return bool(self.boundary_entropy > np.log(2))
 
 
@@ -25,9 +25,9 @@ class Uncertainty(NamedTuple):
     exponent: float
     """The uncertainty exponent."""
     stderr: float
-    """Its standard error."""
+    """Standard error of the exponent."""
     dimension: float
-    """Box-counting dimension of the boundary: that of the grid less the exponent."""
+    """Box-counting dimension of the boundary: that of the grid minus the exponent."""
     distance: np.ndarray
     """Distances used in the fit (cells)."""
     fraction: np.ndarray
@@ -35,14 +35,14 @@ class Uncertainty(NamedTuple):
 
 
 def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
-    """Return the basin entropy: the entropy of attractors within boxes, averaged.
+    """Return the basin entropy, the average entropy of the attractors within boxes.
 
-    Daza et al., Scientific Reports 6, 31416 (2016).
+    See Daza et al., Scientific Reports 6, 31416 (2016).
 
     Args:
         attractor: Numbers of attractors on a grid of any dimension; states that cannot
-            start (-3) are left out.
-        box: Cells along each side of a box.
+            start (-3) are omitted.
+        box: Number of cells along each side of a box.
 
     Returns:
         A `BasinEntropy`.
@@ -83,20 +83,20 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
 def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
     """Return the exponent with which the fraction of uncertain states decreases.
 
-    A state is uncertain if another state at the given distance along an axis ends on
-    another attractor; their fraction scales as distance^exponent (McDonald et al.,
-    Physica D 17, 1985).
+    A state is uncertain if another state at the given distance along an axis leads to a
+    different attractor; the fraction of uncertain states scales as distance^exponent
+    (McDonald et al., Physica D 17, 1985).
 
     Args:
         attractor: Numbers of attractors on a grid of any dimension; pairs with a state
-            that cannot start (-3) are left out.
+            that cannot start (-3) are omitted.
         distances: Distances in cells; the longest must fit into the grid.
 
     Returns:
         An `Uncertainty`.
 
     Raises:
-        ValueError: Fewer than two distances show uncertain states.
+        ValueError: There are uncertain states at fewer than two distances.
 
     Examples:
         >>> from jaxcam.sweeps import uncertainty_exponent
@@ -106,7 +106,7 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
     """
     attractor = np.asarray(attractor)
     axes = [axis for axis, k in enumerate(attractor.shape) if k > 1]
-    # the same states at every distance, so that edges of the grid do not count
+    # the same states at every distance, so that the edges of the grid have no effect
     margin = max(distances)
     found = []
     for distance in distances:
@@ -122,11 +122,11 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
             found.append((distance, different / total))
     if len(found) < 2:
         raise ValueError(
-            "fewer than two distances have states that end on different attractors; "
+            "fewer than two distances have states that lead to different attractors; "
             "use a finer "
             "grid, or one with a boundary in it"
         )
-    # slow to import, and needed for this line only
+    # slow to import, and needed only for this line
     from scipy.stats import linregress
 
     distance, fraction = map(np.array, zip(*found, strict=True))

@@ -1,4 +1,4 @@
-"""Simple cell mapping: basins from one period of each cell. (Hsu, Section 5.3.1)"""
+"""Simple cell mapping: basins from one period per cell (Hsu; thesis, section 5.3.1)."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -13,13 +13,13 @@ class CellMapping(NamedTuple):
     """The destination of each cell of a grid, in the shape of the grid."""
 
     group: np.ndarray
-    """Index of the group on which a cell ends; -1 for the sink cell."""
+    """Index of the group to which each cell leads; -1 for the sink cell."""
     period: np.ndarray
-    """Number of cells of the cycle on which it ends; 0 for the sink cell."""
+    """Number of cells in the cycle to which each cell leads; 0 for the sink cell."""
     steps: np.ndarray
-    """Number of applications of the map until the cycle is reached."""
+    """Number of iterations of the map until the cycle is reached."""
     cyclic: np.ndarray
-    """Whether the cell is part of a cycle."""
+    """Whether each cell is part of a cycle."""
 
 
 def cell_mapping(
@@ -31,23 +31,24 @@ def cell_mapping(
 ) -> CellMapping:
     """Map the centre of every cell once, and follow the cells (simple cell mapping).
 
-    All states outside of the grid, and inadmissible states, form one sink cell,
-    which maps to itself. The cells are an approximation: a cycle of small cells is an
-    attractor. Groups are numbered by their first cell (Hsu, Global analysis by cell
-    mapping, 1992). Compare with [`jaxcam.sweeps.basins`][], which simulates each motion
-    itself.
+    All states outside the grid and all inadmissible states form one sink cell, which
+    maps to itself. The method is an approximation, in which a cycle of small cells
+    represents an attractor. Groups are numbered in the order of their first cells (Hsu,
+    Global analysis by cell mapping, 1992). [`jaxcam.sweeps.basins`][], in contrast,
+    simulates each motion.
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.
         grid: A [`jaxcam.sweeps.Grid`][] of states.
-        turns: Number of periods of one application of the map.
-        progress: Called with the fraction of cells done.
+        turns: Number of periods per iteration of the map.
+        progress: Called with the fraction of cells completed.
 
     Returns:
         A `CellMapping`.
 
     Raises:
-        ValueError: The section is of another kind, or there is less than one period.
+        ValueError: The section is not sampled once per period, or `turns` is less than
+            one.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -58,8 +59,8 @@ def cell_mapping(
     section = as_section(system)
     if not section.regular or turns < 1:
         raise ValueError(
-            "cell mapping needs a section that is sampled once per period, and 1 "
-            "period or more"
+            "cell mapping needs a section that is sampled once per period, and at "
+            "least 1 period"
         )
     states = grid.states()
     images = []
@@ -74,7 +75,7 @@ def cell_mapping(
 
 
 def follow_cells(image, shape) -> CellMapping:
-    """Return groups of cells that lead to one cycle.
+    """Return the groups of cells that lead to the same cycle.
 
     **Arguments:** `image`: the image of each cell, -1 for the sink.
     """
@@ -87,7 +88,7 @@ def follow_cells(image, shape) -> CellMapping:
     for _ in range(doublings):
         smallest = np.minimum(smallest, smallest[far])
         far = far[far]
-    # after this many applications all are on a cycle, named by its smallest cell
+    # after this many iterations, all are on a cycle, identified by its smallest cell
     cyclic = np.zeros(count + 1, dtype=bool)
     cyclic[far] = True
     name = smallest[far]
@@ -101,7 +102,7 @@ def follow_cells(image, shape) -> CellMapping:
 
 
 def _steps(pointer, cyclic):
-    """Return the applications of the map until a cycle is reached, by doubling."""
+    """Return the number of iterations until a cycle is reached, by doubling."""
     steps = np.where(cyclic, 0, 1)
     far = np.where(cyclic, np.arange(len(pointer)), pointer)
     while True:

@@ -1,4 +1,4 @@
-"""Compute charts of labels and exponents over two parameters."""
+"""Compute charts of labels and exponents in the plane of two parameters."""
 
 import functools
 from collections.abc import Callable
@@ -26,7 +26,9 @@ from .sections import AbstractSection
 
 
 _LANES = 1024
-"""Motions in a block; fewer than in other sweeps, as exponents take long."""
+"""Number of motions in a block, smaller than in other sweeps because exponents take
+long.
+"""
 
 
 def chart(
@@ -55,13 +57,13 @@ def chart(
         where: Two parameters: `("speed", "stiffness")`, or two functions.
         first: Values of the first parameter, shape `(k,)`.
         second: Values of the second parameter, shape `(l,)`.
-        states: Initial states, `(n,)` or `(starts, n)`; default in contact at rest.
+        states: Initial states, `(n,)` or `(starts, n)`; default: at rest in contact.
         turns: As for [`jaxcam.sweeps.basins`][].
         keep: As for [`jaxcam.sweeps.basins`][].
         period_tolerance: As for [`jaxcam.sweeps.basins`][].
         reruns: As for [`jaxcam.sweeps.basins`][].
-        exponents: Number of further periods for the largest Lyapunov exponent; 0 for
-            none.
+        exponents: Number of additional periods for the largest Lyapunov exponent; 0 to
+            omit it.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
@@ -90,7 +92,7 @@ def chart(
         raise ValueError("where must be a tuple of two parameters: (one, other)")
     if exponents and exponents < 16:
         raise ValueError(
-            f"exponents is {exponents}; give 16 turns or more, or 0 for none"
+            f"exponents is {exponents}; give at least 16 turns, or 0 for none"
         )
     if block is not None and block < 1:
         raise ValueError(f"block is {block}; give 1 or more values")
@@ -189,7 +191,7 @@ def some_pairs(
     section, where, pairs, starts, shape, turns, keep, period_tolerance, reruns,
     exponents,
 ) -> Arrays:  # fmt: skip
-    """Compute labels, and exponents if requested, at some pairs of values."""
+    """Compute labels, and exponents if requested, for some pairs of values."""
     count, n = starts.shape[1:]
     values = np.repeat(pairs, count, axis=0)
     samples, labels = settle(

@@ -1,4 +1,4 @@
-"""A chart over two parameters."""
+"""A chart in the plane of two parameters."""
 
 import numpy as np
 import xarray
@@ -10,8 +10,8 @@ class Chart:
     """The result of [`jaxcam.sweeps.chart`][].
 
     `dataset` has a dimension for each parameter, the second one first, and `start`; the
-    variables are `impacts` and `turns` (the label), `code` (0, or the reason of a
-    failure), and, if requested, `exponent` and `exponent_stderr` (1/s).
+    variables are `impacts` and `turns` (the label), `code` (0, or the reason for a
+    failure) and, if requested, `exponent` and `exponent_stderr` (1/s).
 
     Examples:
         >>> from jaxcam import sweeps

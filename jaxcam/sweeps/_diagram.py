@@ -38,7 +38,7 @@ def diagram(
     progress: Callable[[Progress], None] | None = None,
     block: int | None = None,
 ) -> Diagram:
-    """Compute a bifurcation diagram: settled motions over the values of a parameter.
+    """Compute a bifurcation diagram: steady-state motions against a parameter.
 
     Args:
         system: A hybrid system, sampled once per period, or a section such as
@@ -46,13 +46,14 @@ def diagram(
         where: The parameter: `lambda s: s.speed`, or `"speed"`.
         values: Values of the parameter, shape `(points,)`.
         states: Initial states: `(n,)`; `(starts, n)` for several at each value;
-            `(points, starts, n)` for others at each, such as from
-            [`jaxcam.sweeps.monte_carlo`][]. Default: in contact at rest.
+            `(points, starts, n)` for different ones at each value, for example from
+            [`jaxcam.sweeps.monte_carlo`][]. Default: at rest in contact.
         turns: Number of periods simulated.
-        keep: Number of final periods that are kept.
-        direction: "each" value from the same start; "up", "down" or "both" carry the
-            state from one value to the next, which shows hysteresis.
-        dwell: Times (s) to wait and to record at each value, instead of `turns`,
+        keep: Number of final periods to keep.
+        direction: With "each", every value starts from the same state; with "up",
+            "down" or "both", the state is carried from one value to the next, which
+            shows hysteresis.
+        dwell: Times (s) to wait and to record at each value, instead of `turns` and
             `keep`.
         period_tolerance: Tolerance for detecting periods.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
@@ -60,7 +61,7 @@ def diagram(
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
-        block: Number of values computed together and stored at once.
+        block: Number of values computed and stored together.
 
     Returns:
         A [`jaxcam.sweeps.Diagram`][].
@@ -87,15 +88,14 @@ def diagram(
     picked = pick(where, section.system)
     if picked.several:
         raise ValueError(
-            "a diagram has one parameter; use chart for two, or pick one of them"
+            "a diagram has one parameter; use chart for two, or select one of them"
         )
     values = as_values(values, 1)
     if dwell is not None:
         if direction == "each":
             raise ValueError(
-                "dwell needs states that are carried from value to value; choose the "
-                "direction up, "
-                "down or both"
+                "dwell requires that the state is carried from value to value; choose "
+                "the direction up, down or both"
             )
         many, kept = dwell_turns(section, picked, values, dwell)
         turns, keep = int(many.max()), int(kept.max())

@@ -20,7 +20,7 @@ from .sections import AbstractSection, component_coordinates, filled
 
 
 _CHAIN = 16
-"""Values of a block if the state is carried from one value to the next."""
+"""Number of values in a block if the state is carried from one value to the next."""
 
 
 class DiagramJob(AbstractJob):
@@ -113,7 +113,7 @@ class DiagramJob(AbstractJob):
 
 class CarriedJob(DiagramJob):
     """Computes values upwards, downwards or both, each from the final state of the
-    last.
+    previous one.
     """
 
     chained = True
@@ -176,15 +176,15 @@ def one_after_the_other(
 ) -> Arrays:
     """Compute some values in order; `first` marks those that start again.
 
-    **Arguments:** `turns`, `keep`: of each value; `room`: capacity for samples, padded
-    with NaN.
+    **Arguments:** `turns`, `keep`: numbers for each value; `room`: capacity for
+    samples, padded with NaN.
     """
     rows = []
     for value, start, anew, many, kept in zip(
         values, starts, first, turns, keep, strict=True
     ):
         state = start if anew or carried is None else carried
-        # a failed lane starts again
+        # a failed lane is restarted
         state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
         lanes = np.full(len(state), value)
         state = section.lifted(state, where, lanes)

@@ -1,4 +1,4 @@
-"""Represent a bifurcation diagram and its properties."""
+"""A bifurcation diagram and its properties."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from .attractors import label_names, Labels
 
 
 class Range(NamedTuple):
-    """Neighbouring values of the parameter with motions of one label."""
+    """Neighbouring parameter values whose motions have the same label."""
 
     label: str
     """The label as text."""
@@ -24,11 +24,12 @@ class Range(NamedTuple):
 class Diagram:
     """The result of [`jaxcam.sweeps.diagram`][].
 
-    `dataset` has the dimensions point (a value of the parameter, in the order in which
-    they were visited), start, sample and component, and the variables `state`, `hits`
+    `dataset` has the dimensions point (parameter values, in the order in which they
+    were visited), start, sample and component, and the variables `state`, `hits`
     (impacts since the previous sample), `impacts` and `turns` (the label, see
-    [`jaxcam.sweeps.attractors.Labels`][]), `code` (0, or the reason of a failure), and,
-    if samples are not a period apart, `time` (s) and `phase` (in periods, from 0 to 1).
+    [`jaxcam.sweeps.attractors.Labels`][]), `code` (0, or the reason for a failure) and,
+    if samples are not one period apart, `time` (s) and `phase` (in periods, from 0 to
+    1).
 
     Examples:
         >>> from jaxcam import sweeps
@@ -54,12 +55,14 @@ class Diagram:
 
     @property
     def states(self) -> np.ndarray:
-        """Samples of the settled motions, shape `(points, starts, keep, n)`."""
+        """Samples of the steady-state motions, shape `(points, starts, keep, n)`."""
         return self.dataset["state"].values
 
     @property
     def direction(self) -> np.ndarray:
-        """1 for values visited upwards, -1 downwards, else 0; shape `(points,)`."""
+        """1 for values visited upwards, -1 downwards, otherwise 0; shape
+        `(points,)`.
+        """
         return self.dataset["direction"].values
 
     @property

@@ -1,4 +1,6 @@
-"""Compute a diagram in seconds, as in an experiment: wait at each value, then store."""
+"""Compute a diagram as in an experiment: wait at each value, then record (in
+seconds).
+"""
 
 import functools
 import math
@@ -19,37 +21,35 @@ _SLACK = 1e-9
 def dwell_turns(
     section: AbstractSection, where: Pick, values, dwell: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the periods at each value, and the number of stored periods.
+    """Return the number of periods at each value, and the number of recorded periods.
 
-    **Arguments:** `dwell`: s to wait, and s to store. The waiting time is rounded up to
-    full periods, and only full periods are stored.
+    **Arguments:** `dwell`: seconds to wait and to record. The waiting time is rounded
+    up to full periods, and only full periods are recorded.
 
     Raises:
-        ValueError: Less than one full period would be stored.
+        ValueError: Less than one full period would be recorded.
     """
     if not section.regular:
-        raise ValueError("dwell needs samples once per period, not at impacts")
+        raise ValueError("dwell requires samples once per period, not at impacts")
     wait, store = (float(seconds) for seconds in dwell)
     if not (0 <= wait < math.inf and 0 < store < math.inf):
         raise ValueError(
-            f"dwell is {dwell}; give the seconds to wait and to store, such as (60, 10)"
+            f"dwell is {dwell}; give the seconds to wait and to record, "
+            "such as (60, 10)"
         )
     length = np.broadcast_to(section.turn(where, values), np.shape(values))
     waited = np.ceil(wait / length - _SLACK).astype(int)
     stored = np.floor(store / length + _SLACK).astype(int)
     if np.min(stored) < 1:
         raise ValueError(
-            f"dwell stores {store:g} s, and a period takes up to {np.max(length):.3g} "
-            "s; "
-            "store longer"
+            f"dwell records {store:g} s, but a period takes up to "
+            f"{np.max(length):.3g} s; record longer"
         )
     return waited + stored, stored
 
 
 class DwellJob(CarriedJob):
-    """Computes values upwards, downwards or both, with the periods of the given
-    seconds.
-    """
+    """Computes values upwards, downwards or both, for times given in seconds."""
 
     def __init__(self, *arguments, dwell: tuple[float, float]):
         self.dwell = dwell

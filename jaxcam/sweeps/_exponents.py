@@ -21,11 +21,11 @@ class Exponents(NamedTuple):
     largest: np.ndarray
     """Largest exponent of each motion (1/s), shape `(lanes,)`."""
     stderr: np.ndarray
-    """Its standard error (1/s), shape `(lanes,)`."""
+    """Standard error of each exponent (1/s), shape `(lanes,)`."""
 
     @property
     def chaotic(self) -> np.ndarray:
-        """Return whether the exponent is more than three standard errors above zero."""
+        """Return whether the exponent is positive by at least three standard errors."""
         return self.largest > 3 * self.stderr
 
 
@@ -38,22 +38,23 @@ def largest_exponents(
     values=None,
     progress: Callable[[float], None] | None = None,
 ) -> Exponents:
-    """Compute the largest Lyapunov exponents of motions from settled states.
+    """Compute the largest Lyapunov exponents of motions in steady state.
 
     Args:
         section: The section, as for [`jaxcam.sweeps.diagram`][].
-        states: Settled states, shape `(lanes, n)`; rows that are NaN stay NaN.
-        turns: Number of periods averaged, at least 16.
-        where: As for a section; motions with the same value of the second
-            parameter are computed together.
+        states: States after the decay of transients, shape `(lanes, n)`; NaN rows give
+            NaN.
+        turns: Number of periods to average over, at least 16.
+        where: As for a section; motions with the same second parameter are computed
+            together.
         values: As for a section.
-        progress: Called with the fraction done.
+        progress: Called with the completed fraction.
 
     Returns:
         An `Exponents`.
 
     Raises:
-        ValueError: The section is a map, whose exponents are not computed here.
+        ValueError: The section is a map, for which exponents are not available.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -66,8 +67,8 @@ def largest_exponents(
     system = section.system
     if not isinstance(system, HybridSystem):
         raise ValueError(
-            "Lyapunov exponents are computed for hybrid systems only; leave them out "
-            "for a map"
+            "Lyapunov exponents are computed only for hybrid systems; omit them for a "
+            "map"
         )
     states = np.asarray(states, dtype=float)
     lanes = len(states)

@@ -1,4 +1,4 @@
-"""Compute basins along a parameter, with consistent numbers of attractors."""
+"""Compute basins along a parameter, with consistent attractor numbers."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,10 +25,11 @@ class FollowedBasins(NamedTuple):
     basins: tuple[Basins, ...]
     """Basins at each value."""
     numbers: tuple[np.ndarray, ...]
-    """For each value, the consistent numbers of its attractors."""
+    """Consistent numbers of the attractors at each value."""
     shares: np.ndarray
-    """Fraction of the states that ends on each attractor, shape `(values, numbers)`; 0
-    where it does not exist."""
+    """Fraction of the states that leads to each attractor, shape `(values, numbers)`; 0
+    where it does not exist.
+    """
     names: np.ndarray
     """Name of each attractor, shape `(values, numbers)`; empty where it does not exist.
     """
@@ -54,10 +55,10 @@ def follow_basins(
         values: Values of the parameter, in the order to visit.
         grid: A [`jaxcam.sweeps.Grid`][] of initial states.
         turns: Number of periods simulated.
-        most: Distance of two orbits, in units of the first scale, beyond which they are
-            not the same attractor. Pairs are chosen so that the sum of distances is
-            smallest; the label may change, for example from P(1,1) to P(2,2).
-        out: Folder in which one sweep is stored for each value.
+        most: Distance between two orbits, in units of the first scale, beyond which
+            they are not the same attractor. Pairs are chosen to minimise the sum of the
+            distances; the label may change, for example from P(1,1) to P(2,2).
+        out: Folder in which a sweep is stored for each value.
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][], for one value at a
             time.
         options: As for [`jaxcam.sweeps.basins`][].

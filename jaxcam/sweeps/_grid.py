@@ -1,4 +1,4 @@
-"""Represent grids of initial states, the centres of cells."""
+"""Grids of initial states, which are the centres of cells."""
 
 import equinox as eqx
 import numpy as np
@@ -8,7 +8,7 @@ class Grid(eqx.Module):
     """A box of states, divided into equal cells.
 
     Raises:
-        ValueError: Lengths do not fit together.
+        ValueError: The lengths are inconsistent.
 
     Examples:
         >>> from jaxcam.sweeps import Grid
@@ -23,21 +23,21 @@ class Grid(eqx.Module):
     shape: tuple[int, ...] = eqx.field(
         converter=lambda x: tuple(map(int, x)), static=True
     )
-    """Number of cells along each component; 1 where it does not vary."""
+    """Number of cells along each component; 1 if the component does not vary."""
 
     def __check_init__(self):
         if not len(self.low) == len(self.high) == len(self.shape) > 0:
             raise ValueError(
                 f"low has {len(self.low)} numbers, high {len(self.high)} and shape "
-                f"{len(self.shape)}; give one of each for every component of the state"
+                f"{len(self.shape)}; give one in each for every component of the state"
             )
         if not np.all(np.isfinite([*self.low, *self.high])):
             raise ValueError("low and high must be finite numbers")
         for low, high, count in zip(self.low, self.high, self.shape, strict=True):
             if count < 1 or high < low or (count > 1 and high == low):
                 raise ValueError(
-                    f"{count} cells from {low:g} to {high:g} cannot be made; give 1 or "
-                    "more cells, and low below high"
+                    f"{count} cells from {low:g} to {high:g} are not possible; give 1 "
+                    "or more cells, and low below high"
                 )
 
     @property
@@ -63,11 +63,11 @@ class Grid(eqx.Module):
         return self.low[axis] + self.sizes[axis] * (np.arange(count) + 0.5)
 
     def states(self, first: int = 0, last: int | None = None) -> np.ndarray:
-        """Return the centres of the cells, the last component fastest.
+        """Return the centres of the cells, with the last component varying fastest.
 
         Args:
             first: First row of the first component.
-            last: Row of the first component at which to stop; default all.
+            last: Row of the first component before which to stop; default all.
 
         Returns:
             Shape `(lanes, n)`.
@@ -78,7 +78,7 @@ class Grid(eqx.Module):
         return np.stack([part.ravel() for part in parts], axis=1)
 
     def cells(self, states) -> np.ndarray:
-        """Return the index of the cell of each state; -1 outside.
+        """Return the index of the cell of each state; -1 outside the grid.
 
         Args:
             states: States, shape `(lanes, n)`.

@@ -11,7 +11,7 @@ LANES = 4096
 
 
 def as_section(system) -> AbstractSection:
-    """Return a section unchanged, and a hybrid system as its stroboscopic section.
+    """Return a section unchanged, or the stroboscopic section of a hybrid system.
 
     Raises:
         ValueError: The argument is neither, or the system has no period.
@@ -41,7 +41,7 @@ def check_turns(
     """Raise `ValueError` for inconsistent numbers."""
     if not 1 <= keep <= turns:
         raise ValueError(
-            f"keep is {keep} and turns {turns}; keep 1 or more of the turns"
+            f"keep is {keep} and turns is {turns}; keep at least 1 of the turns"
         )
     if not 0 < period_tolerance < 1:
         raise ValueError(
@@ -53,7 +53,9 @@ def check_turns(
 
 
 def as_values(values, parameters: int) -> np.ndarray:
-    """Parameter values, shape `(points,)`, or `(points, parameters)` for several."""
+    """Return parameter values, shape `(points,)`, or `(points, parameters)` for
+    several.
+    """
     values = np.asarray(values, dtype=float)
     shape = (len(values),) if parameters == 1 else (len(values), parameters)
     if values.ndim == 0 or values.shape != shape or not len(values):
@@ -64,15 +66,15 @@ def as_values(values, parameters: int) -> np.ndarray:
             else f"values has shape {values.shape}; give a vector"
         )
     if not np.all(np.isfinite(values)):
-        raise ValueError("a value is not finite; every parameter value must be")
+        raise ValueError("a value is not finite; all parameter values must be finite")
     return values
 
 
 def as_starts(section: AbstractSection, states, where, values) -> np.ndarray:
-    """Initial states of each point, shape `(points, starts, n)`.
+    """Return the initial states of each point, shape `(points, starts, n)`.
 
-    `states` is None for the section's own, `(n,)`, `(starts, n)` or `(points, starts,
-    n)`.
+    `states` is None for the default of the section, or has shape `(n,)`, `(starts, n)`
+    or `(points, starts, n)`.
     """
     points = len(values)
     if states is None:

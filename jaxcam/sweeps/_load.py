@@ -14,7 +14,7 @@ def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
     """Load a stored sweep after verifying the checksums of all of its blocks.
 
     Without jaxcam, `xarray.open_dataset(path, engine="zarr", consolidated=False)` reads
-    the same, unchecked.
+    the same data without checks.
 
     Args:
         path: Folder of the sweep.
@@ -24,7 +24,7 @@ def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
 
     Raises:
         ValueError: Blocks are missing or damaged (the message names them), or the
-            folder holds no sweep or an unfinished one.
+            folder contains no sweep or an unfinished one.
 
     Examples:
         >>> from jaxcam import sweeps

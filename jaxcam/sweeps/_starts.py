@@ -14,11 +14,11 @@ def monte_carlo(low, high, count: int, seed: int = 0, points: int | None = None)
         points: Number of parameter values, each with a separate set of states.
 
     Returns:
-        Shape `(count, n)`, or `(points, count, n)`. The sets of the first values do not
-            depend on the number of values.
+        The states, shape `(count, n)` or `(points, count, n)`. The sets for the first
+            values do not depend on the number of values.
 
     Raises:
-        ValueError: The corners do not fit together, or `count` is below one.
+        ValueError: The corners are inconsistent, or `count` is below one.
 
     Examples:
         >>> from jaxcam.sweeps import monte_carlo
@@ -28,7 +28,8 @@ def monte_carlo(low, high, count: int, seed: int = 0, points: int | None = None)
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     if low.shape != high.shape or low.ndim != 1 or not np.all(low <= high):
         raise ValueError(
-            f"low is {low} and high {high}; give the corners of a box, low first"
+            f"low is {low} and high is {high}; give the lower and upper corners of a "
+            "box"
         )
     if count < 1:
         raise ValueError(f"count is {count}; give 1 or more states")

@@ -19,9 +19,9 @@ from .sections import AbstractSection, component_coordinates
 
 
 _SHOWN = 64
-"""Number of points kept of each attractor."""
+"""Maximum number of points kept of each attractor."""
 _ALIKE = 0.05
-"""Distance within which two orbits are one attractor, in units of the scale."""
+"""Distance, in units of the scale, below which two orbits are the same attractor."""
 
 
 def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Dataset:
@@ -74,7 +74,9 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
 
 
 def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
-    """Return the last points of the motions that represent the attractors, in order."""
+    """Return the final points of the motions that represent the attractors, in
+    order.
+    """
     turns, keep, period_tolerance, reruns = job.settings
     n = len(job.grid.shape)
     made = np.full((len(starts), min(_SHOWN, turns), n), np.nan)
@@ -97,7 +99,9 @@ def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
 
 
 def _renumbered(number, found: Attractors, orbit, known: Basins):
-    """Return the numbers of attractors in other basins; new attractors follow."""
+    """Return the numbers that attractors have in other basins; new ones are
+    appended.
+    """
     labels = np.stack([found.impacts, found.turns], axis=1)
     both = (known.labels, labels)
     pairs = match_orbits(known.orbits, orbit, known.scale, _ALIKE, both)

@@ -1,4 +1,4 @@
-"""Find the main events of Table 5.1 in diagrams over the speed."""
+"""Find the main events of Table 5.1 in bifurcation diagrams against speed."""
 
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ from ..sweeps import Diagram
 
 
 CASCADE = tuple(f"P({2**k},{2**k})" for k in range(1, 5))
-"""Orbits to which an orbit with one impact per cycle doubles."""
+"""Period doublings of the orbit with one impact per cycle."""
 
 
 class Events(NamedTuple):
@@ -28,7 +28,7 @@ class Events(NamedTuple):
 
 
 def label_spans(made: Diagram, label: str, way: int) -> list[tuple[float, float]]:
-    """Return the ranges (rpm) of a label in one direction (0: any), the widest
+    """Return the speed ranges (rpm) of a label in one direction (0: any), widest
     first.
     """
     found = [
@@ -40,14 +40,13 @@ def label_spans(made: Diagram, label: str, way: int) -> list[tuple[float, float]
 
 
 def events(up: Diagram, down: Diagram) -> Events:
-    """Return the events of the upward and the downward sweep.
+    """Return the events of the upward and downward sweeps.
 
     Contact, the orbits that follow from it, and the beginning of aperiodic motion are
     taken from the upward sweep; orbits with one impact per turn from the downward
     sweep, P(1,1) below its doubled orbit P(2,2). The chattering route to chaos begins
     after the last speed with P(inf,1). It ends, with the resulting chaos, at the first
-    upward speed on the period-doubling cascade; without such a speed, at the last
-    speed.
+    upward speed on the period-doubling cascade or, failing that, at the last speed.
     """
     contact = label_spans(up, "contact", 1)[0]
     sticking = label_spans(up, "P(inf,1)", 1)[0]
@@ -74,7 +73,7 @@ def events(up: Diagram, down: Diagram) -> Events:
 
 
 def _way(made: Diagram, way: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return speeds (rpm) and labels of one direction."""
+    """Return the speeds (rpm) and labels of one direction."""
     some = made.direction == way
     return np.asarray(rad_s_to_rpm(made.values))[some], made.labels[some, 0]
 
@@ -83,7 +82,9 @@ _LABELS = ("angle", "rad"), ("velocity", "rad/s")
 
 
 def draw_diagram(made: Diagram, ax, component: int = 0) -> None:
-    """Draw the angle (component 0) or velocity (component 1) over the speed in rpm."""
+    """Draw the angle (component 0) or velocity (component 1) against the speed in
+    rpm.
+    """
     plotting.sweep_diagram(
         made,
         ax,

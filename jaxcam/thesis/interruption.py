@@ -14,12 +14,13 @@ from .speeds import at_speed, speed_of
 
 
 INTERRUPTION = 152.67658
-"""Interruption of the thesis' rig (section 6.7.1), and the speed of Table 6.1.
+"""Interruption speed of the rig of the thesis (section 6.7.1), and speed of Table
+6.1.
 """
 REFERENCE = 152.67
 _RANGE, _RANGES = 12.0, 5
-"""Width of the search ranges (rpm), and the number of further ranges above and below
-that of the thesis.
+"""Width of the search ranges (rpm), and number of further ranges on either side of the
+speed in the thesis.
 """
 _MOVED = 0.01
 """Resolution (rpm) of printed speeds shifted to another rig's interruption."""
@@ -30,7 +31,7 @@ def interruption(system: CamFollower) -> CamFollower:
     """Return the rig at the speed of the interruption of its complete chatter.
 
     Raises:
-        ValueError: The interruption is not within 66 rpm of the thesis' speed.
+        ValueError: The interruption is not within 66 rpm of the speed in the thesis.
     """
     places = [0, *(way * k for k in range(1, _RANGES + 1) for way in (1, -1))]
     for place in counted("searching a range of speeds for the interruption", places):
@@ -38,15 +39,14 @@ def interruption(system: CamFollower) -> CamFollower:
         ends = np.array([middle - _RANGE / 2, middle + _RANGE / 2])
         low, high = np.asarray(rpm_to_rad_s(ends))
         found = _search(system, low, high)
-        # above it chattering is interrupted; at the beginning of impacts it is the
-        # reverse
+        # above it chatter is interrupted; at detachment it is the reverse
         if bool(found.converged) and found.ends[0] < 0 < found.ends[1]:
             return at_speed(system, found.value)
     far = _RANGE * (_RANGES + 0.5)
     raise ValueError(
-        "This rig has no interruption of chattering between "
-        f"{INTERRUPTION - far:.0f} and {INTERRUPTION + far:.0f} rpm; the theory around "
-        "one has nothing to start from."
+        "This rig has no interruption of chatter between "
+        f"{INTERRUPTION - far:.0f} and {INTERRUPTION + far:.0f} rpm, which the "
+        "theory near an interruption requires."
     )
 
 
@@ -59,7 +59,8 @@ def beside_interruption(system: CamFollower, rpm: float) -> float:
     """Return a speed (rpm) at the same distance from the interruption as a printed
     speed.
 
-    It is rounded to 0.01 rpm, so that printed speeds are unchanged for the thesis' rig.
+    It is rounded to 0.01 rpm, so that printed speeds are unchanged for the rig of the
+    thesis.
     """
     own = float(rad_s_to_rpm(interruption(system).speed))
     moved = round((own - INTERRUPTION) / _MOVED) * _MOVED
@@ -69,7 +70,7 @@ def beside_interruption(system: CamFollower, rpm: float) -> float:
 def reference(system: CamFollower) -> CamFollower:
     """Return the rig at the distance of Table 6.1 below its interruption.
 
-    Close to the interruption chattering depends only on that distance.
+    Close to the interruption chatter depends only on that distance.
     """
     below = float(rpm_to_rad_s(INTERRUPTION - REFERENCE))
     return at_speed(system, speed_of(interruption(system)) - below)
@@ -82,8 +83,8 @@ contact_at = eqx.filter_jit(surface_state)
 
 @eqx.filter_jit
 def sticking_state(system: CamFollower):
-    """Return state, gap and relative velocity at the end of the period of a sticking
-    orbit.
+    """Return the state, gap and relative velocity of a sticking orbit at the end of its
+    period.
     """
     system = system.prepared()
     release = chatter_frame(system)

@@ -1,13 +1,13 @@
-"""Recover the rig parameters behind the thesis' numbers from Tables 5.2 and 6.1.
+"""Recover the parameters of the rig of the thesis from Tables 5.2 and 6.1.
 
-Table 4.4 is rounded, the spring was fitted again after it was printed, and neither the
-restitution nor the sense of rotation is stated. This module finds them:
+Table 4.4 is rounded, the spring was refitted afterwards, and the thesis gives neither
+the restitution law nor the sense of rotation. This module finds them:
 
 1. Free flight is conservative, so the product of the two multipliers of P(1,1) is r^2.
    The law is a straight line through the ten values of r from Table 5.2.
 2. Seven parameters start at Table 4.4 with a tolerance of 2 % and are fitted to the
    sums of the multipliers from 147.9 to 153.4 rpm and to Table 6.1.
-3. Both senses of rotation are fitted. Only one fits.
+3. Both senses of rotation are tried. Only one fits.
 
 Run it as `python -m jaxcam.thesis.make_calibrated` to print the parameters of
 `preset("calibrated")`.
@@ -37,8 +37,9 @@ from .speeds import at_rpm, speed_of
 TOLERANCE = 0.02
 """Relative tolerance of the values in Table 4.4."""
 TRACE_ERROR = 1e-6
-"""Error of a printed sum of multipliers: they have twelve digits, but come from AUTO,
-whose orbits are converged to 1e-6 or 1e-7 as a rule."""
+"""Error of a printed sum of multipliers: the values have twelve digits, but come from
+AUTO, whose orbits are usually converged to 1e-6 or 1e-7.
+"""
 
 NAMES = (
     "eccentricity",
@@ -56,8 +57,8 @@ NAMES = (
 class Observed(eqx.Module):
     """The rig, and the time of the first row of Table 6.1.
 
-    The time is printed with five digits, which is less accurate than angle and velocity
-    require, so it is an additional unknown.
+    The time is printed with five digits, fewer than the accuracy of angle and velocity
+    requires, so it is an additional unknown.
     """
 
     system: CamFollower
@@ -65,14 +66,16 @@ class Observed(eqx.Module):
 
 
 class Law(NamedTuple):
-    """Restitution as a function of speed, and the residuals of the ten values."""
+    """Coefficient of restitution as a function of speed, and the residuals of the ten
+    values.
+    """
 
     law: LinearInSpeed
     residuals: Float[np.ndarray, " rows"]
 
 
 def restitution_law() -> Law:
-    """Fit the line to the square roots of the products of the multipliers."""
+    """Fit a line to the square roots of the products of the multipliers."""
     r = np.sqrt(table_5_2.PRODUCTS)
     slope, intercept = np.polyfit(table_5_2.SPEEDS, r, 1)
     law = LinearInSpeed(slope=rad_s_to_rpm(slope), intercept=intercept)
@@ -80,10 +83,11 @@ def restitution_law() -> Law:
 
 
 def nominal_rig(rotation: str = "clockwise") -> CamFollower:
-    """Return the rig of Table 4.4 with that law, and time zero at the largest lift.
+    """Return the rig of Table 4.4 with the fitted law, and time zero at the largest
+    lift.
 
-    The last column of Table 6.1 implies this: relative and absolute velocity agree at
-    the end of the period, so the contact velocity is zero there.
+    The last column of Table 6.1 implies this time origin: relative and absolute
+    velocity agree at the end of the period, so the contact velocity is zero there.
     """
     system = CamFollower(restitution=restitution_law().law, rotation=rotation)
     angles = jnp.linspace(0.0, 2 * jnp.pi, 4097)
@@ -93,7 +97,7 @@ def nominal_rig(rotation: str = "clockwise") -> CamFollower:
 
 
 def free(observed: Observed):
-    """Return the fitted numbers, in the order of `NAMES`; x0 and J only set scales."""
+    """Return the fitted numbers in the order of `NAMES`; x0 and J only set scales."""
     system = observed.system
     return [
         system.profile.eccentricity,  # pyright: ignore
@@ -111,8 +115,8 @@ def free(observed: Observed):
 def tolerances(system: CamFollower) -> list[float]:
     """Return 2 % of each nominal value; y0, which is zero, has the tolerance of x0.
 
-    Only the sum of the cam's radius and the follower's half height is identifiable, so
-    the radius has the tolerance of both. The phases have none.
+    Only the sum of the cam radius and the follower's half height is identifiable, so
+    the radius has the tolerance of the sum. The phases have none.
     """
     cam = system.profile
     sizes = [
@@ -128,14 +132,15 @@ def tolerances(system: CamFollower) -> list[float]:
 
 
 def published(system: CamFollower) -> list[Published]:
-    """Return Tables 5.2 and 6.1 with functions that compute them near `system`.
+    """Return the values of Tables 5.2 and 6.1 with functions that compute them near
+    `system`.
 
     Raises:
         ValueError: The rig has no P(1,1) at 148 rpm to start from.
     """
     guess = first_orbit(system)
     if guess is None:
-        raise ValueError("The rig has no orbit with one impact a turn at 148 rpm.")
+        raise ValueError("The rig has no orbit with one impact per turn at 148 rpm.")
     far = ~table_5_2.NEAR_FOLD
     speeds = jnp.asarray(rpm_to_rad_s(table_5_2.SPEEDS[far]))
     point = release_point(

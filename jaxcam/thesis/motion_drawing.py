@@ -1,4 +1,4 @@
-"""Draw settled motions: time series next to phase portraits."""
+"""Draw settled motions as time series and phase portraits."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ def _cam(run: Trajectory, times):
 
 
 def draw_angles(ax, run: Trajectory) -> None:
-    """Draw cam (dashed) and follower against time."""
+    """Draw the cam (dashed) and follower angles against time."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.time, drawn.state[:, 0], color=FLIGHT, lw=1.3, label="follower")
     times = np.linspace(float(run.t0), float(run.t1), 1500)
@@ -34,18 +34,18 @@ def draw_angles(ax, run: Trajectory) -> None:
 
 
 def draw_gap(ax, run: Trajectory) -> None:
-    """Draw the angle between follower and cam against time."""
+    """Draw the angle between the follower and the cam against time."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.time, drawn.gap[:, 0], color=FLIGHT, lw=1.1)
     ax.axhline(0, color="0.4", lw=0.7)
     if np.nanmax(np.abs(drawn.gap)) < 1e-9:
         # permanent contact: rounding is not shown
         ax.set_ylim(-1e-3, 1e-3)
-    ax.set_ylabel("over cam (rad)")
+    ax.set_ylabel("above cam (rad)")
 
 
 def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
-    """Draw velocity over angle, with the samples once per period."""
+    """Draw velocity against angle, with the samples once per period."""
     drawn = trajectory_curve(run, None, 3000)
     ax.plot(drawn.state[:, 0], drawn.state[:, 1], color=FLIGHT, lw=0.9)
     for before, after in zip(drawn.before, drawn.after, strict=True):
@@ -53,7 +53,9 @@ def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
     turns = motion.turns or round(float(run.t1 - run.t0) / float(run.system.period))
     times = float(run.t0) + float(run.system.period) * np.arange(turns)
     points = np.asarray(run.at(times))
-    ax.plot(*points.T, "o", color="k", ms=5, mec="white", mew=0.6, label="once a turn")
+    ax.plot(
+        *points.T, "o", color="k", ms=5, mec="white", mew=0.6, label="once per turn"
+    )
     ax.set_ylabel("velocity (rad/s)")
 
 
@@ -62,7 +64,9 @@ def _turns(motion: SettledMotion) -> int:
 
 
 def motion_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure:
-    """Draw a row for each motion: angles, the gap below, and the phase portrait."""
+    """Draw a row for each motion: the angles with the gap below, and the phase
+    portrait.
+    """
     rows = len(found)
     figure = plt.figure(figsize=(9.6, 3.6 * rows))
     grid = figure.add_gridspec(2 * rows, 2, width_ratios=(3, 2))
@@ -87,7 +91,7 @@ def motion_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure
 
 
 def series_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure:
-    """Draw only angles, with a panel for each motion (Figure 5.2)."""
+    """Draw only the angles, with a panel for each motion (Figure 5.2)."""
     rows = -(-len(found) // 2)
     figure, axes = plt.subplots(rows, 2, figsize=(9.6, 2.4 * rows), squeeze=False)
     for ax, motion in zip(axes.flat, found, strict=False):

@@ -1,4 +1,4 @@
-"""Define figures that show motions, as time series next to phase portraits."""
+"""Define figures that show motions as time series and phase portraits."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -12,18 +12,19 @@ from .target import Rows, Target
 
 
 RECORDED_NOTE = (
-    "The thesis shows a recording; printed is what it says of that. Simulated is the "
-    "rig at the same speed: the two differ where Table 5.1 says so."
+    "The thesis shows a recording, and the printed values are what it says about the "
+    "recording. The computed ones are simulated at the same speed; the two differ "
+    "where Table 5.1 says so."
 )
 WINDOW = (
-    "An orbit that sticks forgets its past, so within the chaos behind the "
-    "interruption there are windows of orbits that rest once in several turns."
+    "Sticking erases the past of an orbit, so the chaos beyond the interruption "
+    "contains windows with orbits that stick once in several turns."
 )
 
 
 @dataclasses.dataclass(frozen=True)
 class MotionTarget(Target):
-    """A figure of motions that have settled."""
+    """A figure of settled motions."""
 
     cases: tuple[ShownMotion, ...] = ()
 
@@ -46,7 +47,7 @@ def motion_target(
 ) -> MotionTarget:
     """Create the target of a figure of motions, drawn one below the other.
 
-    **Arguments:** `layout`: function that draws the rig's motions instead.
+    **Arguments:** `layout`: function that draws the motions of the rig instead.
     """
 
     def compute(system: CamFollower) -> Rows:

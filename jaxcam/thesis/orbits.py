@@ -18,13 +18,13 @@ from .speeds import at_rpm, speed_of
 
 
 NEAR_CAM = (0.3, 0.0)
-"""A state near the cam, from which Newton's method finds contact."""
+"""A state near the cam from which Newton's method finds contact."""
 SEARCH, _STRIDE = 148.0, 0.5
-"""Start of the search for the branch (rpm), and the longest step along it."""
+"""Speed at which the search for the branch starts, and largest step along it (rpm)."""
 
 
 def first_orbit(system: CamFollower) -> ImpactOrbit | None:
-    """Return the P(1,1) at 148 rpm that is not a saddle, or None."""
+    """Return the P(1,1) orbit at 148 rpm that is not a saddle, or None."""
     orbits = one_impact_orbits(at_rpm(system, SEARCH), jnp.array(NEAR_CAM))
     return orbits[0] if orbits else None
 
@@ -46,7 +46,9 @@ def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.nd
 
 
 def ordered_multipliers(matrix) -> np.ndarray:
-    """Return eigenvalues, the larger in magnitude last; complex pairs as -, +."""
+    """Return the eigenvalues, larger magnitude last; complex pairs in the order -,
+    +.
+    """
     matrix = np.asarray(matrix)
     if not np.all(np.isfinite(matrix)):
         return np.full(2, np.nan, dtype=complex)
@@ -56,15 +58,15 @@ def ordered_multipliers(matrix) -> np.ndarray:
     return values[np.argsort(np.abs(values))]
 
 
-# A line in the plane of trace and product of the multipliers: trace = a + b product.
-# a = b = 1 is a fold, a = b = -1 a flip, and b = 0 asks for a trace.
+# A line in the plane of trace and product of the multipliers: trace = a + b product. a
+# = b = 1 is a fold, a = b = -1 a flip, and b = 0 specifies a trace.
 FOLD, FLIP = (1.0, 1.0), (-1.0, -1.0)
 
 
 def point_on_line(
     system: CamFollower, guess: SpecialPoint, line: tuple[float, float]
 ) -> SpecialPoint:
-    """Return the point of the branch on a line; `guess.parameter` is in rad/s."""
+    """Return the point of the branch on such a line; `guess.parameter` is in rad/s."""
     system = eqx.tree_at(speed_of, system, guess.parameter)
     return _point(system, guess.orbit, jnp.asarray(line[0]), jnp.asarray(line[1]))
 
@@ -74,7 +76,7 @@ def along_traces(
 ) -> SpecialPoint:
     """Return the point with the sum of multipliers `trace`, reached from 148 rpm.
 
-    The trace is monotonic along the branch, also around the fold, where the speed is
+    The trace is monotonic along the branch even around the fold, where the speed is
     not.
     """
     point = SpecialPoint(jnp.asarray(rpm_to_rad_s(SEARCH)), start)

@@ -1,7 +1,7 @@
 """Report progress of the long computations of a target.
 
-Targets are functions of a rig whose results are cached by their arguments. Therefore
-the callback is set by a context manager, not passed as an argument.
+Targets are functions of a rig whose results are cached by argument. The callback is
+therefore set by a context manager instead of being passed as an argument.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -41,12 +41,12 @@ def reporting(progress: Report | None) -> Iterator[None]:
 
 
 def report(sentence: str, fraction: float | None = None) -> None:
-    """Report the present computation of a target, and the fraction done."""
+    """Report the current computation of a target, and the fraction done."""
     _REPORT.get()(sentence, fraction)
 
 
 def of_sweep(sentence: str) -> Callable[[Progress], None]:
-    """Return the `progress` callback of a sweep inside a target."""
+    """Return the `progress` callback for a sweep inside a target."""
 
     def callback(at: Progress) -> None:
         report(sentence, at.done / at.total)
@@ -55,16 +55,16 @@ def of_sweep(sentence: str) -> Callable[[Progress], None]:
 
 
 def of_share(sentence: str) -> Callable[[float], None]:
-    """Return the `progress` callback of a computation that reports the fraction
+    """Return the `progress` callback for a computation that reports the fraction
     done.
     """
     return lambda share: report(sentence, share)
 
 
 def of_branch(low: float, high: float) -> "Callable[[Point], None]":
-    """Return the callback of a branch over the speed between bounds (rpm).
+    """Return the callback for a branch in the speed between bounds (rpm).
 
-    It reports the number of points, and the share of the range that they span.
+    It reports the number of points and the share of the range that they span.
     """
     seen: list[float] = []
 
@@ -80,7 +80,7 @@ def of_branch(low: float, high: float) -> "Callable[[Point], None]":
 
 
 def counted(sentence: str, items: Collection[_T]) -> Iterator[_T]:
-    """Yield each item, and report before it how many are done."""
+    """Yield each item, first reporting how many are done."""
     for k, item in enumerate(items):
         report(f"{sentence}, {k + 1} of {len(items)}", k / len(items))
         yield item

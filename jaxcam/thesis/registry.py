@@ -1,4 +1,4 @@
-"""Find all targets by the file names in the chapters."""
+"""Find all targets from the file names in the chapters."""
 
 import pkgutil
 from collections.abc import Callable
@@ -19,15 +19,15 @@ _KINDS = ("table", "figure")
 
 
 def _place(module: str) -> tuple[int, int, int]:
-    """Return the sort key of a file such as `figure_5_11`: chapter, tables first,
-    number.
+    """Return the sort key of a file such as `figure_5_11`: chapter, tables before
+    figures, number.
     """
     kind, chapter, number = module.rpartition(".")[2].split("_")
     return int(chapter), _KINDS.index(kind), int(number)
 
 
 def _discovered() -> dict[str, Target]:
-    """Return the `TARGET` of each file `table_C_N.py` or `figure_C_N.py` of the
+    """Return the `TARGET` of each file `table_C_N.py` or `figure_C_N.py` in the
     chapters.
     """
     here = Path(__file__).parent
@@ -56,21 +56,20 @@ def reproduce(
     *,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> "pd.DataFrame":
-    """Reproduce a table of the thesis, or the numbers of a figure, next to the printed
-    ones.
+    """Reproduce a table of the thesis, or the numbers of a figure, and compare with the
+    print.
 
     Args:
         name: A key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".
         system: The rig, such as `jaxcam.models.preset("calibrated")`.
-        size: "default", or "full" for diagrams and basins at the resolution of the
-            published ones.
-        progress: Called with a sentence and a fraction, or `None`.
+        size: "default", or "full" for diagrams and basins at the published resolution.
+        progress: Called with a sentence and the fraction done (or `None`).
 
     Returns:
-        Columns quantity, printed, computed, unit, difference, relative (the difference
-            over the size of the printed value); speeds in rpm and everything else in SI
-            units. NaN if the rig has no such quantity; a printed value is NaN if the
-            thesis shows only a drawing.
+        Columns quantity, printed, computed, unit, difference and relative (the
+            difference divided by the magnitude of the printed value); speeds are in rpm
+            and everything else in SI units. A computed value is NaN if the rig has no
+            such quantity; a printed value is NaN if the thesis shows only a drawing.
 
     Raises:
         ValueError: The name or size is unknown.

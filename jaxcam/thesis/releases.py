@@ -1,4 +1,6 @@
-"""Simulate cycles from the release of a sticking orbit, to see if the next sticks."""
+"""Simulate cycles from the release of a sticking orbit, to see whether the next one
+sticks.
+"""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -22,7 +24,7 @@ _LOOKS = 8
 def released_turn(system: CamFollower, rpm: float) -> Trajectory:
     """Simulate 1.1 turns from the release of a sticking orbit."""
     rig = at_speed(system, rpm_to_rad_s(rpm))
-    # a rig of another phase may be in contact at time zero: try later times, too
+    # a rig with another phase may be in contact at time zero: also try later times
     times = float(rig.period) / _LOOKS * np.arange(_LOOKS)
     found = [_release(rig, time) for time in times]
     release = next((one for one in found if float(one.holds) == 0), found[0])
@@ -36,7 +38,9 @@ def _release(system, time):
 
 
 def sticking_time(run: Trajectory) -> float:
-    """Return the duration of contact in a run (s), except for one at its very start."""
+    """Return the total contact time in a run (s), except for contact at its very
+    start.
+    """
     contacts = run.contacts
     later = np.asarray(contacts.start) > float(run.t0)
     return float(np.sum((np.asarray(contacts.end) - np.asarray(contacts.start))[later]))
@@ -48,14 +52,14 @@ def draw_turn(run: Trajectory, ax, label: str, colour: str, dashes="solid") -> N
     gap = np.asarray(run.gap(times))
     ax.plot(times - times[0], gap, color=colour, ls=dashes, lw=1.2, label=label)
     ax.set_xlabel("time from release (s)")
-    ax.set_ylabel("angle over cam (rad)")
+    ax.set_ylabel("angle above cam (rad)")
 
 
 def released_target(title: str, *cases: tuple[float, float], note: str = "") -> Target:
-    """Create the target of a figure of one turn from release at several speeds.
+    """Create the target for a figure of one turn from release at several speeds.
 
-    **Arguments:** `cases`: speed (rpm), and whether it sticks: 1, 0, or NaN if not
-    stated.
+    **Arguments:** `cases`: speed (rpm), and whether the motion sticks: 1, 0, or NaN if
+    the thesis does not say.
     """
 
     def compute(system: CamFollower) -> Rows:
@@ -66,7 +70,12 @@ def released_target(title: str, *cases: tuple[float, float], note: str = "") -> 
             rests = float(time > 0)
             never = 0 if printed == 0 else np.nan
             rows += [
-                (f"{rpm:g} rpm: rests in the turn from release", printed, rests, ""),
+                (
+                    f"{rpm:g} rpm: contact intervals in the turn from release",
+                    printed,
+                    rests,
+                    "",
+                ),
                 (f"{rpm:g} rpm: sticking time", never, time, "s"),
             ]
         return rows

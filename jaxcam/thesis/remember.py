@@ -14,7 +14,7 @@ _KEPT = 6
 
 
 def remembered(function: Callable[..., _T]) -> Callable[..., _T]:
-    """Cache the last results of a function of a rig and of hashable arguments.
+    """Cache the latest results of a function of a rig and hashable arguments.
 
     A sweep is computed once for its table and its figure. Rigs are distinguished by the
     values of their parameters.

@@ -18,7 +18,7 @@ from .target import Rows
 
 
 _TURNS, _KEEP, _RERUNS = 300, 64, 2
-"""Cycles before the first check, samples kept, and number of doublings."""
+"""Cycles before the first check, samples kept, and number of extensions."""
 
 
 class ShownMotion(NamedTuple):
@@ -26,7 +26,7 @@ class ShownMotion(NamedTuple):
 
     rpm: float
     state: tuple[float, float] | None
-    """At time zero; None is in contact at rest."""
+    """State at time zero; None is contact at rest."""
     impacts: float
     """Printed P(impacts, turns); zero impacts mean permanent contact, zero turns chaos.
     """
@@ -40,11 +40,11 @@ class ShownMotion(NamedTuple):
 
 
 class SettledMotion(NamedTuple):
-    """The settled motion."""
+    """A settled motion."""
 
     case: ShownMotion
     impacts: int
-    """As in `jaxcam.sweeps.attractors.Labels`."""
+    """Number of turns, as in `jaxcam.sweeps.attractors.Labels`."""
     turns: int
     rests: int
     """Number of contact intervals in one orbit, or in all the turns kept."""
@@ -59,7 +59,7 @@ class SettledMotion(NamedTuple):
 
 @remembered
 def settled(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[SettledMotion]:
-    """Simulate the cases until they repeat, or for 2100 turns."""
+    """Simulate the cases until they repeat, for at most 2100 turns."""
     section = Stroboscopic(system)
     speeds = np.asarray(rpm_to_rad_s(np.array([case.rpm for case in cases])))
     states = np.array(section.starts(speed_of, speeds))
@@ -102,12 +102,16 @@ def motion_rows(found: Sequence[SettledMotion]) -> Rows:
     for motion in found:
         case, at = motion.case, motion.case.title
         if case.turns == 0:
-            words = f"{at}: turns of the orbit (0: does not repeat)"
+            words = f"{at}: period of the orbit in turns (0: aperiodic)"
             rows.append((words, 0, motion.turns, ""))
             continue
-        rows.append((f"{at}: turns of the orbit", case.turns, motion.turns, ""))
+        rows.append(
+            (f"{at}: period of the orbit in turns", case.turns, motion.turns, "")
+        )
         if case.impacts == np.inf:
-            rows.append((f"{at}: rests of the orbit", case.turns, motion.rests, ""))
+            rows.append(
+                (f"{at}: contact intervals of the orbit", case.turns, motion.rests, "")
+            )
         else:
             count = {STICKING: np.inf, CONTACT: 0}.get(motion.impacts, motion.impacts)
             count = count if motion.turns > 0 else np.nan

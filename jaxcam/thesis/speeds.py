@@ -7,7 +7,7 @@ from ..models import CamFollower, rpm_to_rad_s
 
 
 def speed_of(system):
-    """Return the cam speed (rad/s), the parameter of most targets."""
+    """Return the cam speed (rad/s), the parameter in most targets."""
     return system.speed
 
 

@@ -1,4 +1,4 @@
-"""Define targets: printed values, the computation, the drawing."""
+"""Define targets: printed values, computation and drawing."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -28,13 +28,15 @@ class Target:
     title: str
     """Title of the table or figure."""
     compute: Callable[..., Rows]
-    """Takes the rig; returns rows of quantity, printed and computed value, and unit."""
+    """Takes the rig; returns rows of quantity, printed value, computed value and
+    unit.
+    """
     draw: Callable[..., Figure] | None = None
-    """Takes the rig and returns the figure; tables have no drawing."""
+    """Takes the rig and returns the figure; None for a table."""
     sized: bool = False
-    """Whether both also take a size, "default" or "full"."""
+    """Whether `compute` and `draw` also take a size, "default" or "full"."""
     note: str = ""
-    """Remark for the comparison."""
+    """Remark on the comparison."""
 
     def table(
         self,
@@ -43,9 +45,7 @@ class Target:
         *,
         progress: Report | None = None,
     ) -> "pd.DataFrame":
-        """Return printed next to computed values, as [`jaxcam.thesis.reproduce`][]
-        does.
-        """
+        """Return printed and computed values, as [`jaxcam.thesis.reproduce`][] does."""
         with reporting(progress):
             return frame(self.compute(system, *self._size(size)))
 
@@ -58,7 +58,7 @@ class Target:
     ) -> Figure | None:
         """Return the drawing in the current style; None for a table.
 
-        `progress` is called with a sentence and a fraction, or `None`.
+        `progress` is called with a sentence and the fraction done (or `None`).
         """
         if self.draw is None:
             return None
@@ -75,8 +75,8 @@ class Target:
 def frame(rows: Iterable[Row]) -> "pd.DataFrame":
     """Create a table from rows of quantity, printed value, computed value and unit.
 
-    The relative difference is the difference divided by the size of the printed value;
-    NaN if the printed value is zero and the computed value is not.
+    The relative difference is the difference divided by the magnitude of the printed
+    value; NaN if the printed value is zero and the computed value is not.
     """
     import pandas as pd
 

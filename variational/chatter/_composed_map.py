@@ -166,7 +166,7 @@ def composed_map(
 
     Args:
         system: The system at the interruption ([`variational.chatter_interruption`][]).
-        where: Picks the parameter.
+        where: Selects the parameter.
         rank: Number of the impact D* after release, counted from 0. The later D* is,
             the better the lambda-map describes the following impacts, but the smaller
             are the deviations for which A and C are linear: they must change the time
@@ -293,7 +293,7 @@ def simulated_by_parameter(
 
     Args:
         system: The system at the interruption.
-        where: Picks the parameter.
+        where: Selects the parameter.
         changes: Changes of the parameter, shape `(k,)`.
         phase: Phase of the section, in periods.
 

@@ -14,7 +14,7 @@ from ...recordings.cut import measured_noise
 from ._piece_length import bearable_length
 
 
-# Largest number of samples in a piece: enough for its own initial state, short compared
+# Maximum number of samples in a piece: enough for its own initial state, short compared
 # with the time over which impacts magnify an error
 _PIECE = 100
 # A flight with fewer samples than the first number gives no information by itself;

@@ -215,7 +215,7 @@ class Problem:
 
     @property
     def longest_flight(self) -> int:
-        """Largest number of pieces in a flight."""
+        """Maximum number of pieces in a flight."""
         return longest_flight(self.spans)
 
     def parameter(self, name: str) -> Parameter:

@@ -13,21 +13,23 @@ from ._normal import free_jet, gaps, normal_acceleration, normal_velocity
 class ReleasePoint(eqx.Module):
     """The time and state at which contact ends.
 
-    `holds`: 0 for a release, 1 if contact still holds, 2 without contact.
+    `holds`: 0 for a release, 1 if contact is maintained at `t`, 2 if there is no
+    contact.
     """
 
     time: Float[Array, ""]
     """Time of release (s)."""
     state: Float[Array, " n"]
-    """State there, shape `(n,)`."""
+    """State at release, shape `(n,)`."""
     holds: Float[Array, ""]
-    """0 for a release, 1 if contact still holds, 2 without contact."""
+    """0 for a release, 1 if contact is maintained at `t`, 2 if there is no contact."""
 
 
 def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]:
     """Return the state of sustained contact at each of `times`.
 
-    Zero gap and zero normal velocity determine it; found by Newton's method.
+    It is determined by zero gap and zero normal velocity, and is computed by Newton's
+    method.
 
     Args:
         system: A system with two states and one constraint.
@@ -48,10 +50,10 @@ def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]
 
 
 def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " times"]:
-    """Return the normal acceleration that contact suppresses at each of `times`.
+    """Return the normal acceleration suppressed by contact at each of `times`.
 
-    Contact holds while it is negative; the follower detaches where its maximum over the
-    period is positive.
+    Contact is maintained while it is negative; the body detaches if its maximum over
+    the period is positive.
 
     Args:
         system: A system with two states and one constraint.
@@ -82,7 +84,7 @@ def _contact(system: HybridSystem, times, guess):
 
 
 def _onto(system: HybridSystem, t: RealScalar, x: State) -> State:
-    """Take one Newton step of the two states onto gap = normal velocity = 0."""
+    """Take one Newton step of the two states towards gap = normal velocity = 0."""
 
     def both(y):
         return gaps(system, t, y)[0], normal_velocity(system, t, y)[0]
@@ -101,12 +103,13 @@ def release_point(
     Args:
         system: A system with a `period`, two states and one constraint.
         t: Time (s).
-        guess: State near the surface for Newton's method, shape `(n,)`, default zeros.
+        guess: Initial guess near the surface for Newton's method, shape `(n,)`; default
+            zeros.
         samples: Number of points in the scan.
 
     Returns:
-        The release. Where contact holds at `t`, the state of contact at `t` with
-            `holds` 1; `holds` is 2 where there is no contact at all in a period.
+        The release. If contact is maintained at `t`, the state of contact at `t`, with
+            `holds` = 1; `holds` is 2 if there is no contact in the period.
 
     Examples:
         >>> from jaxcam.hybrid.surface import release_point
@@ -124,7 +127,7 @@ def release_point(
     rises = (values[:-1] < 0) & (values[1:] >= 0)
     last = jnp.where(jnp.any(rises), samples - 1 - jnp.argmax(rises[::-1]), 0)
     low, high = grid[last], grid[last + 1]
-    # the chord is close enough for Newton, which also carries the derivative
+    # the chord is close enough for Newton's method, which also carries the derivative
     rise = values[last + 1] - values[last]
     share = -values[last] / jnp.where(rises[last], rise, 1.0)
     start = jax.lax.stop_gradient(low + share * (high - low))

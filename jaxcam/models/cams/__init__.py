@@ -1,4 +1,4 @@
-"""Shapes of cams: profiles, motion programs and laws, contours."""
+"""Cam shapes: profiles, motion programs, motion laws and contours."""
 
 from ._cam_contour import (
     CamContour as CamContour,

@@ -1,7 +1,7 @@
 """Compute the shape of a cam from the motion of its follower.
 
 The cam turns counterclockwise about the origin of the fixed frame; a contour is given
-in the frame of the cam, which coincides with the fixed one at cam angle zero.
+in the frame of the cam, which coincides with the fixed frame at zero cam angle.
 """
 
 from collections.abc import Callable
@@ -17,9 +17,8 @@ from ._eccentric_circle import EccentricCircle
 class CamContour(NamedTuple):
     """Contour of a cam; every field has shape `(angles,)`.
 
-    A radius of curvature that is not positive means that the contour cannot be made: it
-    would cut itself off (undercutting). Choose a larger base circle, or a smaller
-    roller.
+    If a radius of curvature is not positive, the contour cannot be manufactured because
+    of undercutting. Choose a larger base circle or a smaller roller.
     """
 
     x: Float[Array, " angles"]
@@ -29,20 +28,24 @@ class CamContour(NamedTuple):
     radius_of_curvature: Float[Array, " angles"]
     """Radius of curvature (m), positive where the contour is convex."""
     pressure_angle: Float[Array, " angles"]
-    """Angle between the contact force and the motion of the point of contact (rad)."""
+    """Pressure angle (rad), between the contact force and the motion of the contact
+    point.
+    """
     arm: Float[Array, " angles"]
-    """Lever of the contact force about the hinge (m); 1 for a translating follower."""
+    """Lever arm of the contact force about the hinge (m); 1 for a translating
+    follower.
+    """
 
 
 def flat_translating_contour(
     profile: Callable[[Any], Any], base_radius, cam_angles: Float[ArrayLike, " angles"]
 ) -> CamContour:
-    """Return the cam contour for a flat-faced follower that slides along a line through
-    its axis.
+    """Return the cam contour for a flat-faced follower that translates along a line
+    through the cam axis.
 
     Args:
         profile: Lift as a length (m), as a function of the cam angle (rad).
-        base_radius: Distance of the face from the axis at lift zero (m).
+        base_radius: Distance of the face from the cam axis at zero lift (m).
         cam_angles: Cam angles (rad), shape `(angles,)`.
 
     Returns:
@@ -74,22 +77,23 @@ def flat_oscillating_contour(
 ) -> CamContour:
     """Return the cam contour for a flat-faced follower hinged at the origin.
 
-    The common normal meets the line from the hinge to the axis of the cam where both
-    bodies have one velocity, which gives the contact point from lift and slope alone.
+    The common normal intersects the line from the hinge to the cam axis at the point
+    where both bodies have the same velocity, so the contact point follows from lift and
+    slope.
 
     Args:
         profile: Angle of the follower (rad) as a function of the cam angle (rad).
         cam_angles: Cam angles (rad), shape `(angles,)`.
-        center: Axis of the cam (x0, y0) from the hinge (m); known for an
-            [`jaxcam.models.EccentricCircle`][].
+        center: Position (x0, y0) of the cam axis relative to the hinge (m); known for
+            an [`jaxcam.models.EccentricCircle`][].
         half_height: Distance of the face from the hinge (m); known for an
             [`jaxcam.models.EccentricCircle`][].
 
     Returns:
-        The contour about the cam's axis.
+        The contour about the cam axis.
 
     Raises:
-        ValueError: The axis or the half height is unknown.
+        ValueError: The cam axis or the half height is unknown.
 
     Examples:
         >>> from jaxcam.models import EccentricCircle, flat_oscillating_contour
@@ -104,8 +108,8 @@ def flat_oscillating_contour(
             half_height = profile.half_height
     if center is None or half_height is None:
         raise ValueError(
-            "Give `center` and `half_height`: this profile does not know where the "
-            "cam's axis and the follower's face are."
+            "Give `center` and `half_height`: this profile does not define the cam "
+            "axis and the follower face."
         )
     x0, y0 = center
 
@@ -119,8 +123,8 @@ def flat_oscillating_contour(
 
         (point, arm), (rate, _) = jax.jvp(contact, (angle,), (jnp.ones_like(angle),))
         lift, slope, _ = _jet(profile, angle)
-        # the face's own direction, seen from the cam, turns with slope - 1,
-        # and the contact point moves along it against its rotation
+        # the direction of the face, seen from the cam, turns with slope - 1, and the
+        # contact point moves along it against its rotation
         along = rate[0] * jnp.cos(lift - angle) + rate[1] * jnp.sin(lift - angle)
         pressure = jnp.arctan(half_height / arm)
         return CamContour(point[0], point[1], along / (1 - slope), pressure, arm)
@@ -178,7 +182,7 @@ def roller_oscillating_contour(
     Args:
         profile: Angle of the arm (rad) from the x-axis, as a function of the cam angle
             (rad).
-        pivot: Pivot (m) from the cam's axis.
+        pivot: Position of the pivot relative to the cam axis (m).
         arm_length: Length of the arm (m).
         roller_radius: Radius of the roller (m).
         cam_angles: Cam angles (rad), shape `(angles,)`.
@@ -218,7 +222,7 @@ def _roller(profile, center, direction, length, roller_radius, cam_angles):
         point = pitch(angle)
         first, second = jax.jvp(rate, (angle,), unit)
         size = jnp.hypot(first[0], first[1])
-        # in the frame of the cam the follower moves clockwise: left is outside
+        # in the frame of the cam, the follower moves clockwise: left is outside
         outward = jnp.stack([-first[1], first[0]]) / size
         pitch_radius = size**3 / (first[1] * second[0] - first[0] * second[1])
         x, y = point - roller_radius * outward

@@ -1,4 +1,4 @@
-"""Define the thesis' cam: a circular disc that turns about an eccentric point."""
+"""The cam of the thesis: a circular disc that turns about an eccentric point."""
 
 import equinox as eqx
 import jax
@@ -11,13 +11,14 @@ from ._profile import CamProfile
 
 
 _TAIL = 1e-13
-"""Largest part of the profile (rad) that its Fourier series may leave out."""
+"""Largest part of the profile (rad) that the Fourier series may omit."""
 
 
 class EccentricCircle(CamProfile):
-    """A flat follower, hinged at the origin, on an eccentric circular cam.
+    """Profile of an eccentric circular cam with a flat follower hinged at the origin.
 
-    The contact angle is that of the thesis, eq. 4.23; the defaults are its Table 4.4.
+    The contact angle is given in the thesis, eq. 4.23; the defaults are those of its
+    Table 4.4.
 
     Examples:
         >>> from jaxcam.models import EccentricCircle
@@ -28,20 +29,20 @@ class EccentricCircle(CamProfile):
     radius: jax.Array = parameter(0.045)
     """Radius of the cam R (m)."""
     eccentricity: jax.Array = parameter(0.015)
-    """Distance of its centre from the axis it turns about, e (m)."""
+    """Distance of the centre of the disc from the cam axis, e (m)."""
     center_x: jax.Array = parameter(0.249)
-    """x-coordinate of the cam's axis from the follower's hinge, x0 (m)."""
+    """x-coordinate of the cam axis relative to the follower hinge, x0 (m)."""
     center_y: jax.Array = parameter(0.0)
-    """y-coordinate of the cam's axis from the follower's hinge, y0 (m)."""
+    """y-coordinate of the cam axis relative to the follower hinge, y0 (m)."""
     half_height: jax.Array = parameter(0.021)
-    """Distance of the follower's flat face from its hinge, d (m)."""
+    """Distance of the flat face of the follower from its hinge, d (m)."""
     harmonics: int = eqx.field(default=12, static=True)
-    """Number of harmonics that `prepared` keeps."""
+    """Number of harmonics kept by `prepared`."""
 
     def __check_init__(self):
         if self.harmonics < 1:
             raise ValueError(
-                f"Keep at least one of the `harmonics`; they are {self.harmonics}."
+                f"Keep at least one harmonic; `harmonics` is {self.harmonics}."
             )
 
     def __call__(self, cam_angle) -> jax.Array:
@@ -53,21 +54,23 @@ class EccentricCircle(CamProfile):
     def prepared(self) -> FourierProfile:
         """Return the same profile as a Fourier series, differentiable in the geometry.
 
-        The coefficients come from an FFT of thesis eq. 4.23 over one turn.
+        The coefficients are computed by an FFT of the contact angle (thesis, eq. 4.23)
+        over one turn.
 
         Returns:
             A [`jaxcam.models.FourierProfile`][].
 
         Raises:
             ValueError: The omitted harmonics add up to more than 1e-13 rad. Inside
-                `jax.jit` the values are unknown and nothing is raised; call `check`
+                `jax.jit`, the values are unknown and no error is raised; call `check`
                 first.
         """
         mean, cosines, sines, left_out = _series(self)
         if is_concrete(left_out) and not left_out <= _TAIL:
             raise ValueError(
-                f"Raise `harmonics` of the cam profile: the {self.harmonics} kept now "
-                f"leave out up to {left_out:.1e} rad of it."
+                f"Increase `harmonics` of the cam profile: with {self.harmonics}, "
+                "up to "
+                f"{left_out:.1e} rad of it are omitted."
             )
         return FourierProfile(mean, cosines, sines)
 
@@ -82,13 +85,13 @@ class EccentricCircle(CamProfile):
         offset = np.abs(self.eccentricity)
         if not np.all(np.asarray(self.center_x) > offset):
             raise ValueError(
-                "Place the cam's axis to the right of the follower's hinge: `center_x` "
+                "Place the cam axis to the right of the follower hinge: `center_x` "
                 "must exceed `eccentricity`."
             )
         nearest = np.hypot(self.center_x, self.center_y) - offset
         if not np.all(nearest > np.asarray(self.radius + self.half_height)):
             raise ValueError(
-                "Move the cam away from the follower's hinge, or make it smaller: the "
+                "Move the cam away from the follower hinge, or make it smaller: the "
                 "distance of its centre from the hinge must exceed `radius + "
                 "half_height` at every cam angle."
             )
@@ -97,9 +100,9 @@ class EccentricCircle(CamProfile):
 
 @eqx.filter_jit
 def _series(circle: EccentricCircle):
-    """Return mean, cosines and sines that are kept, and the sum of the others (rad)."""
+    """Return the mean, cosines and sines to keep, and the sum of the others (rad)."""
     keep = circle.harmonics
-    # four times the kept harmonics: the aliasing error is then far smaller than the
+    # four times the kept harmonics, so that the aliasing error is far smaller than the
     # first omitted harmonic
     points = max(64, 4 * keep)
     angles = 2 * np.pi * np.arange(points) / points

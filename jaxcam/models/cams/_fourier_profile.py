@@ -13,8 +13,8 @@ from ._profile import CamProfile
 class FourierProfile(CamProfile):
     """A profile `mean + sum_k cosines[k-1] cos(k a) + sines[k-1] sin(k a)`.
 
-    Smooth to all orders, and the cheapest profile: one sine and one cosine for any
-    number of harmonics.
+    It is infinitely smooth and the cheapest profile to evaluate: one sine and one
+    cosine for any number of harmonics.
 
     Raises:
         ValueError: The two lists are empty or differ in length.
@@ -27,7 +27,7 @@ class FourierProfile(CamProfile):
     """
 
     mean: jax.Array = parameter()
-    """Contact angle averaged over a turn (rad)."""
+    """Mean contact angle over a turn (rad)."""
     cosines: jax.Array = parameter()
     """Cosine coefficients of harmonics 1, 2, ... (rad), shape `(harmonics,)`."""
     sines: jax.Array = parameter()
@@ -52,7 +52,7 @@ def _sum(angle, mean, cosines, sines):
     # fuse into plain arithmetic, and the derivatives of a gap share the waves.
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     twice = 2 * cosine
-    # the mean is added last: it is the largest, and would round each of the others
+    # the mean is added last, because it is the largest and would round all other terms
     total = cosines[0] * cosine + sines[0] * sine
     before, now = (jnp.ones_like(cosine), jnp.zeros_like(sine)), (cosine, sine)
     for k in range(1, cosines.shape[-1]):
@@ -62,9 +62,9 @@ def _sum(angle, mean, cosines, sines):
     return mean + total
 
 
-# The derivative of a series is again a series. A custom rule halves the work of gap,
-# velocity, acceleration and jerk together, against differentiating the recurrence.
-# Traced once for each number of harmonics, since a simulation asks for it many times.
+# The derivative of a series is also a series. A custom rule halves the total cost of
+# gap, velocity, acceleration and jerk compared with differentiating the recurrence. It
+# is traced once for each number of harmonics, because a simulation uses it many times.
 _series = saving_jvp(_sum)
 
 

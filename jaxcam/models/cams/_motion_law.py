@@ -1,4 +1,4 @@
-"""Laws of motion of one segment of a cam's motion program."""
+"""Motion laws for the segments of a cam motion program."""
 
 import math
 from typing import NamedTuple
@@ -20,10 +20,9 @@ class LawPiece(NamedTuple):
 
 
 class MotionLaw(NamedTuple):
-    """A normalised rise from 0 to 1 while the fraction u of the segment goes from 0 to
-    1.
+    """A normalised rise from 0 to 1 as the fraction u of the segment goes from 0 to 1.
 
-    Laws of your own are made of the same pieces; the last one ends at 1.
+    Laws of your own consist of the same pieces; the last one ends at 1.
     """
 
     name: str
@@ -72,7 +71,9 @@ MOTION_LAWS: dict[str, MotionLaw] = {
         ),
     )
 }
-"""The laws that a [`jaxcam.models.Segment`][] may name (R. L. Norton, Cam Design and
-Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is 3u^2 - 2u^3, the only cubic
-with zero velocity at both ends; "modified sine" is a cycloidal law of four times the
-frequency in the first and last eighth, joined by a third of that."""
+"""The laws available by name for a [`jaxcam.models.Segment`][] (R. L. Norton, Cam
+Design and Manufacturing Handbook, 2002, chapters 2 to 4). "cubic" is 3u^2 - 2u^3, the
+only cubic with zero velocity at both ends; "modified sine" is a cycloidal law with four
+times the base frequency in the first and last eighth, joined by a sine with a third of
+that frequency.
+"""

@@ -1,4 +1,4 @@
-"""Define motion programs of cams: the follower's motion in each part of a turn."""
+"""Motion programs of cams: the motion of the follower in each part of a turn."""
 
 import math
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ from ._profile import CamProfile
 
 _TURN = 2 * np.pi
 _CLOSED = 1e-9
-"""Closing error allowed for rounding, relative to the turn or to the largest rise."""
+"""Allowed closing error due to rounding, relative to the turn or the largest rise."""
 
 
 class Segment(NamedTuple):
@@ -35,13 +35,13 @@ class Segment(NamedTuple):
     width: Any
     """Cam angle of the segment (rad)."""
     rise: Any = 0.0
-    """Change of the lift over it; negative for a fall, 0 for a dwell."""
+    """Change of the lift over the segment; negative for a fall, 0 for a dwell."""
 
 
 class Joint(NamedTuple):
-    """Joints of a motion program, and the jumps there.
+    """Joints of a motion program, and the jumps at each joint.
 
-    `jumps`, shape `(joints, 4)`: of lift, velocity, acceleration and jerk, for each
+    `jumps`, shape `(joints, 4)`: jumps of lift, velocity, acceleration and jerk, per
     radian of the cam.
     """
 
@@ -53,13 +53,13 @@ class Joint(NamedTuple):
 
 
 class MotionProgram(CamProfile):
-    """A cam profile made of segments, one after the other, closed over a turn.
+    """A cam profile that consists of consecutive segments and is closed over a turn.
 
     The lift is an angle (rad) for an oscillating follower and a length (m) for a
-    translating one. The program runs in order on a cam whose angle grows, which for
-    [`jaxcam.models.CamFollower`][] means `rotation="counterclockwise"`. It is made from
-    a list of [`jaxcam.models.Segment`][], whose widths add up to a turn and whose rises
-    add up to zero.
+    translating one. The segments are traversed in order if the cam angle increases,
+    which for [`jaxcam.models.CamFollower`][] means `rotation="counterclockwise"`. The
+    program is created from a list of [`jaxcam.models.Segment`][], whose widths must add
+    up to one turn and whose rises must add up to zero.
 
     Raises:
         ValueError: A law is unknown, or the program does not close.
@@ -77,7 +77,7 @@ class MotionProgram(CamProfile):
     rises: jax.Array
     """Change of the lift over each segment."""
     base: jax.Array
-    """Lift at cam angle zero, where the first segment begins."""
+    """Lift at zero cam angle, where the first segment begins."""
     laws: tuple[MotionLaw, ...] = eqx.field(static=True)
     """Law of each segment."""
 
@@ -116,10 +116,10 @@ class MotionProgram(CamProfile):
         )
 
     def derivatives(self, cam_angle) -> Float[Array, "... 4"]:
-        """Return lift, velocity, acceleration and jerk per radian of the cam (s, v, a,
-        j).
+        """Return lift, velocity, acceleration and jerk (s, v, a, j) per radian of the
+        cam.
 
-        At a joint, the values just after it.
+        At a joint, these are the values just after it.
 
         Returns:
             Shape `(..., 4)`.
@@ -129,9 +129,9 @@ class MotionProgram(CamProfile):
 
     def joints(self) -> Joint:
         """Return the joints of the pieces, with the jumps of lift, velocity,
-        acceleration, jerk.
+        acceleration and jerk.
 
-        Laws of several pieces have joints inside their segment.
+        Laws that consist of several pieces have joints inside their segment.
 
         Returns:
             A [`jaxcam.models.cams.Joint`][].
@@ -151,23 +151,23 @@ class MotionProgram(CamProfile):
         if abs(turn - _TURN) > _CLOSED * _TURN:
             hint = "; they look like degrees" if turn > 90 else ""
             raise ValueError(
-                "Make the widths of the segments add up to a turn, 2 pi: they add up "
-                f"to {turn:g} rad{hint}."
+                "The widths of the segments must add up to one turn, 2 pi, but they "
+                f"add up to {turn:g} rad{hint}."
             )
         for law, rise in zip(self.laws, np.asarray(self.rises), strict=True):
             if law.name == "dwell" and rise != 0:
-                raise ValueError(f"A dwell cannot rise; give it rise 0, not {rise:g}.")
+                raise ValueError(f"A dwell must have a rise of 0, not {rise:g}.")
         scale = float(jnp.max(jnp.abs(self.rises)))
         total = float(jnp.sum(self.rises))
         if not abs(total) <= _CLOSED * max(scale, 1e-300):
             raise ValueError(
-                "Make the rises and falls of the segments add up to zero: they add up "
-                f"to {total:g}."
+                "The rises and falls of the segments must add up to zero, but they add "
+                f"up to {total:g}."
             )
 
 
 class MotionPieces(CamProfile):
-    """A program as pieces of polynomials and sines; made by
+    """A program as pieces of polynomials and sines, created by
     `MotionProgram.prepared`.
     """
 
@@ -176,7 +176,7 @@ class MotionPieces(CamProfile):
     origins: jax.Array = parameter()
     """Cam angle at which the fraction u is zero (rad), shape `(pieces,)`."""
     widths: jax.Array = parameter()
-    """Cam angle over which u grows by one (rad), shape `(pieces,)`."""
+    """Cam angle over which u increases by one (rad), shape `(pieces,)`."""
     coefficients: jax.Array = parameter()
     """Coefficients of `polynomial(u)`, lowest power first, shape `(pieces, powers)`."""
     amplitudes: jax.Array = parameter()
@@ -196,9 +196,10 @@ class MotionPieces(CamProfile):
         return value + self.amplitudes[piece] * wave
 
     def local(self, cam_angle):
-        """Return the piece at an angle, and the fraction of its segment passed."""
+        """Return the piece at an angle, and the fraction u of its segment."""
         angle = jnp.mod(cam_angle, _TURN)
-        # unrolled: an inner loop would keep a simulation's loop from fusing
+        # unrolled, because an inner loop would prevent fusion in the loop of a
+        # simulation
         after = jnp.searchsorted(
             self.starts, angle, side="right", method="scan_unrolled"
         )
@@ -211,9 +212,10 @@ class MotionPieces(CamProfile):
         return jnp.concatenate([self.starts[1:], turn])
 
     def jet(self, piece, cam_angle) -> Float[Array, "... 4"]:
-        """Return value and three derivatives of given pieces, continued to any angle.
+        """Return the value and three derivatives of given pieces, continued to any
+        angle.
 
-        A joint has a value on either side; the piece selects the side.
+        A joint has a value on each side; the choice of piece selects the side.
         """
         cam_angle = jnp.asarray(cam_angle, dtype=float)
         angle = jnp.where(cam_angle == _TURN, cam_angle, jnp.mod(cam_angle, _TURN))
@@ -244,7 +246,7 @@ def _law(law) -> MotionLaw:
 
 
 def _table(laws):
-    """Tabulate for each piece its segment, its start in it, polynomial and wave."""
+    """Tabulate the segment, start, polynomial and sine of each piece."""
     pieces = [(i, piece) for i, law in enumerate(laws) for piece in law.pieces]
     powers = max(len(piece.polynomial) for _, piece in pieces)
     owner = np.array([i for i, _ in pieces])

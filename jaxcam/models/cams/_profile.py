@@ -1,4 +1,4 @@
-"""Cam profiles: the follower's angle while it rests on the cam."""
+"""Cam profiles: the position of the follower in contact with the cam."""
 
 import abc
 
@@ -8,7 +8,7 @@ from jaxtyping import Array, Real
 
 
 class CamProfile(eqx.Module):
-    """The contact angle of the follower as a function of the cam's angle.
+    """The contact angle of the follower as a function of the cam angle.
 
     A profile is periodic over one turn and at least three times continuously
     differentiable, because release from the cam depends on the jerk of the gap.
@@ -25,7 +25,9 @@ class CamProfile(eqx.Module):
 
     @abc.abstractmethod
     def __call__(self, cam_angle: Real[Array, "..."]) -> jax.Array:
-        """Follower angle (rad) in contact at `cam_angle` (rad), elementwise."""
+        """Return the follower angle (rad) in contact at `cam_angle` (rad),
+        elementwise.
+        """
 
     def prepared(self) -> "CamProfile":
         """Return an equivalent profile that is cheaper to evaluate many times."""

@@ -10,7 +10,7 @@ from ._profile import CamProfile
 
 _TURN = 2 * np.pi
 _FEWEST_POINTS = 6
-# A quintic c0 + c1 u + ... + c5 u^5 from value, slope and curvature at 0 and at 1.
+# A quintic c0 + c1 u + ... + c5 u^5 from value, slope and curvature at 0 and at 1
 _HERMITE = np.array(
     [
         [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -24,10 +24,12 @@ _HERMITE = np.array(
 
 
 class SplineProfile(CamProfile):
-    """Periodic quintic spline through a table of points, continuous to order four.
+    """Periodic quintic spline through a table of points, with four continuous
+    derivatives.
 
-    The coefficients need a dense solve of twice as many unknowns as points, once per
-    simulation; smooth thousands of points first.
+    The coefficients are computed once per simulation, from a dense linear system with
+    twice as many unknowns as points; a table of thousands of points should be smoothed
+    and reduced first.
 
     Raises:
         ValueError: The table is too short, not finite or not increasing, spans more
@@ -42,10 +44,11 @@ class SplineProfile(CamProfile):
     """
 
     angles: jax.Array
-    """Cam angles (rad), shape `(points,)`, strictly increasing within one turn, evenly
-    spaced or not. The first point may be repeated a turn later."""
+    """Cam angles (rad), shape `(points,)`, strictly increasing within one turn; they
+    need not be evenly spaced. The first point may be repeated one turn later.
+    """
     lifts: jax.Array
-    """Contact angles of the follower there (rad), shape `(points,)`."""
+    """Contact angles of the follower at these points (rad), shape `(points,)`."""
 
     def __init__(self, angles, lifts):
         angles, lifts = as_parameter(angles), as_parameter(lifts)
@@ -64,7 +67,7 @@ class SplineProfile(CamProfile):
         return self.prepared()(cam_angle)
 
     def prepared(self) -> "PiecewiseProfile":
-        """Return the spline's polynomial pieces, differentiable in the table."""
+        """Return the polynomial pieces of the spline, differentiable in the table."""
         widths = jnp.diff(self.angles, append=self.angles[:1] + _TURN)
         coefficients = _quintic_pieces(widths, self.lifts)
         return PiecewiseProfile(self.angles, widths, coefficients)
@@ -75,20 +78,22 @@ class SplineProfile(CamProfile):
 
 
 class PiecewiseProfile(CamProfile):
-    """A periodic profile of polynomial pieces; `SplineProfile.prepared` makes it."""
+    """A periodic profile of polynomial pieces, created by `SplineProfile.prepared`."""
 
     starts: jax.Array = parameter()
     """Cam angle at which each piece begins (rad), shape `(pieces,)`."""
     widths: jax.Array = parameter()
     """Length of each piece (rad), shape `(pieces,)`."""
     coefficients: jax.Array = parameter()
-    """Shape `(pieces, order)`, lowest power first, of the fraction of the piece that
-    has been passed."""
+    """Coefficients in powers of the fraction of the piece, lowest first, shape
+    `(pieces, order)`.
+    """
 
     def __call__(self, cam_angle) -> jax.Array:
         angle = jnp.mod(cam_angle - self.starts[0], _TURN)
         starts = self.starts - self.starts[0]
-        # unrolled: an inner loop would keep a simulation's loop from fusing
+        # unrolled, because an inner loop would prevent fusion in the loop of a
+        # simulation
         after = jnp.searchsorted(starts, angle, side="right", method="scan_unrolled")
         piece = after - 1
         local = (angle - starts[piece]) / self.widths[piece]
@@ -143,7 +148,7 @@ def _quintic_pieces(widths, lifts):
 
 
 def _checked_table(angles, lifts) -> int:
-    """Return the number of points to keep: all, or all but a repetition of the
+    """Return the number of points to keep: all, or all except a repetition of the
     first.
     """
     if len(angles) < _FEWEST_POINTS:
@@ -159,7 +164,7 @@ def _checked_table(angles, lifts) -> int:
         index = int(np.argmin(np.diff(angles) > 0))
         raise ValueError(
             "Sort the cam profile by strictly increasing cam angle: point "
-            f"{index + 1} at {angles[index + 1]} does not come after {angles[index]}."
+            f"{index + 1} at {angles[index + 1]} is not greater than {angles[index]}."
         )
     span = angles[-1] - angles[0]
     if span > _TURN * (1 + 1e-6):
@@ -178,7 +183,7 @@ def _checked_table(angles, lifts) -> int:
     jump = abs(lifts[-1] - lifts[0])
     if jump > 1e-6:
         raise ValueError(
-            "Make the cam profile close: its last point is the first one a turn later, "
-            f"but their lifts differ by {jump:.2e} rad."
+            "The cam profile is not closed: its last point is the first one a turn "
+            f"later, but their lifts differ by {jump:.2e} rad; make them equal."
         )
     return len(angles) - 1

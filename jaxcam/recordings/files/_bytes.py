@@ -13,7 +13,7 @@ LARGEST = 100_000_000
 800 Hz. Reading takes about ten times as much memory.
 """
 MOST = 15_000_000
-"""Largest number of values in a table, regardless of the file's size."""
+"""Maximum number of values in a table, regardless of the file's size."""
 _GZIP = b"\x1f\x8b"
 
 

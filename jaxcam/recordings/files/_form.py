@@ -11,7 +11,7 @@ SEPARATORS = ("\t", ";", ",", " ")
 """Cell separators, the most specific first; a space stands for any white space."""
 COMMENTS = ("#", "%", "//")
 """Beginnings of comment lines."""
-# largest number of lines of a preamble
+# maximum number of lines of a preamble
 _PREAMBLE = 300
 # number of consistent rows required to recognise a table
 _ROWS = 5

@@ -1,4 +1,4 @@
-"""Find attractors of motions, and label them."""
+"""Find the attractors of motions, and label them."""
 
 from ._attractors import (
     attractor_names as attractor_names,

@@ -10,18 +10,18 @@ from ._unique_rows import unique_rows
 
 
 NONE = {ESCAPED: -1, FAILED: -2, OUTSIDE: -3}
-"""Codes in place of the number of an attractor."""
+"""Codes used instead of the number of an attractor."""
 
 
 class Attractors(NamedTuple):
-    """The attractors of motions, periodic ones first, by period, impacts and place."""
+    """The attractors, periodic ones first, in order of period, impacts and position."""
 
     impacts: np.ndarray
     turns: np.ndarray
     fingerprint: np.ndarray
-    """(attractors, means) see `fingerprints`."""
+    """Fingerprints, shape (attractors, means); see `fingerprints`."""
     lane: np.ndarray
-    """(attractors,) the representative lane of each."""
+    """Representative lane of each attractor, shape (attractors,)."""
 
     def __len__(self) -> int:
         return len(self.turns)
@@ -30,21 +30,21 @@ class Attractors(NamedTuple):
 def find_attractors(
     impacts, turns, fingerprint, cells, starts, same: float
 ) -> tuple[np.ndarray, Attractors]:
-    """Find attractors, and the number of the attractor of each lane.
+    """Find the attractors, and the attractor of each motion (lane).
 
     Args:
-        impacts: Labels, shape `(lanes,)`.
-        turns: Labels, shape `(lanes,)`.
+        impacts: Number of impacts in each label, shape `(lanes,)`.
+        turns: Number of periods in each label, shape `(lanes,)`.
         fingerprint: Shape `(lanes, means)`.
         cells: An iterable of pairs: indices of non-periodic lanes, and the cells
             `(lanes, keep)` that they visit.
-        starts: `(lanes, n)`; of several lanes on an attractor, that with the smallest
-            start represents it.
-        same: Two orbits are equal if their fingerprints differ by less.
+        starts: Initial states, `(lanes, n)`; of several lanes on an attractor, the one
+            with the smallest initial state represents it.
+        same: Two orbits are equal if their fingerprints differ by less than this.
 
     Returns:
-        Numbers `(lanes,)`, -1 for motions that escaped, -2 for those that failed and -3
-            for those that could not start; and the attractors.
+        The attractor numbers `(lanes,)`, with -1 for motions that escaped, -2 for those
+            that failed and -3 for those that could not start; and the attractors.
     """
     lanes = len(turns)
     group = np.full(lanes, -1)
@@ -88,8 +88,8 @@ def _ordered(group, impacts, turns, fingerprint, starts):
 
 
 def attractor_names(impacts, turns) -> list[str]:
-    """Return names P(1,1), P(6,6) a, P(6,6) b, ...: letters distinguish equal
-    labels.
+    """Return names such as P(1,1), P(6,6) a and P(6,6) b, in which letters distinguish
+    equal labels.
     """
     plain = [label_name(int(m), int(n)) for m, n in zip(impacts, turns, strict=True)]
     made = []

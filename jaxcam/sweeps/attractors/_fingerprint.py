@@ -10,7 +10,7 @@ from ._unique_rows import unique_rows
 
 
 _WAVES = 8
-"""Number of waves whose averages distinguish orbits of equal mean."""
+"""Number of waves whose averages distinguish orbits with the same mean."""
 
 
 def fingerprint_size(n: int) -> int:
@@ -19,16 +19,17 @@ def fingerprint_size(n: int) -> int:
 
 
 def fingerprints(states, turns, origin, scale) -> np.ndarray:
-    """Compute the mean of each orbit, and of some waves over it.
+    """Compute, for each orbit, the means of the states and of some waves.
 
-    They do not depend on the starting point of an orbit, vary smoothly with it, and
-    differ for different orbits, including symmetric images of each other.
+    These fingerprints do not depend on the starting point on the orbit, vary smoothly
+    with the orbit, and differ for different orbits, including symmetric images of each
+    other.
 
     Args:
-        states: Shape `(lanes, keep, n)`; the last `turns` of them are one orbit, all of
-            them if `turns` is 0.
-        origin: Shape `(n,)`, in which states are of order one.
-        scale: Shape `(n,)`, in which states are of order one.
+        states: States, shape `(lanes, keep, n)`; the last `turns` states are one orbit,
+            or all of them if `turns` is 0.
+        origin: Origin, shape `(n,)`; `(states - origin) / scale` is of order one.
+        scale: Scale of the states, shape `(n,)`.
 
     Returns:
         Shape `(lanes, fingerprint_size(n))`; NaN for lanes without an orbit.
@@ -52,15 +53,15 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
 
 
 def clusters(points, same: float) -> np.ndarray:
-    """Return the numbers of the groups of points, shape `(k,)`.
+    """Return the group number of each point, shape `(k,)`.
 
-    Points closer than `same` in every component are in one group, also by a chain of
-    such points, independent of their order.
+    Points closer than `same` in every component are in the same group, as are points
+    connected by a chain of such points, regardless of their order.
     """
     points = np.asarray(points, dtype=float)
     if not len(points):
         return np.zeros(0, dtype=int)
-    # many motions end at the same point; examine each place once
+    # many motions end at the same point, so each position is examined once
     places, back = unique_rows(np.round(points / (same / 4)))
     tree = KDTree(places)
     pairs = tree.query_pairs(4.0, p=np.inf, output_type="ndarray")
@@ -72,9 +73,9 @@ def clusters(points, same: float) -> np.ndarray:
 class SharedCells:
     """Groups of non-periodic motions that visit common cells.
 
-    Chaotic motions have no characteristic point, but two motions on one attractor enter
-    the same cells. Cells joined by a chain of motions are one group, independent of the
-    order of the motions.
+    Chaotic motions have no characteristic point, but two motions on the same attractor
+    enter the same cells. Cells connected by a chain of motions form one group,
+    regardless of the order of the motions.
     """
 
     def __init__(self):
@@ -84,7 +85,7 @@ class SharedCells:
         """Add motions with the cells they visit, shape `(lanes, keep)`.
 
         Returns:
-            One cell of each motion, to look up its group at the end.
+            One cell of each motion, used to look up its group at the end.
         """
         cells = np.asarray(cells)
         if not len(cells):
@@ -119,7 +120,7 @@ def cell_codes(states, origin, scale, fine: float) -> np.ndarray:
 
 
 def _spanning(edges) -> np.ndarray:
-    """Return a minimal set of edges that joins the same cells."""
+    """Return a minimal set of edges that connects the same cells."""
     known, group = _components(edges)
     order = np.argsort(group, kind="stable")
     starts = np.searchsorted(group[order], group)
@@ -134,6 +135,6 @@ def _components(edges):
 
 
 def _graph(rows, columns, count: int):
-    # repeated edges merge
+    # repeated edges are merged
     joined = np.ones(len(rows), dtype=bool)
     return coo_array((joined, (rows, columns)), shape=(count, count))

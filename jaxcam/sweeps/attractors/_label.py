@@ -10,9 +10,9 @@ from ._unique_rows import unique_rows
 
 
 APERIODIC, ESCAPED, FAILED, OUTSIDE = 0, -1, -2, -3
-"""Codes in place of a number of periods."""
+"""Codes used instead of a number of periods."""
 STICKING, CONTACT, UNCOUNTED = -1, -2, -3
-"""Codes in place of a number of impacts: infinitely many, permanent contact, not
+"""Codes used instead of a number of impacts: infinitely many, permanent contact, not
 counted.
 """
 
@@ -24,30 +24,30 @@ class Labels(NamedTuple):
     """The attractor type of each lane, as small integers.
 
     `turns` is the period in forcing periods (or in points, on a section that is not
-    sampled once per period), or one of `APERIODIC`, `ESCAPED`, `FAILED`, `OUTSIDE`;
-    `impacts` counts those of one orbit, or is one of `STICKING`, `CONTACT`,
-    `UNCOUNTED`.
+    sampled once per period), or one of `APERIODIC`, `ESCAPED`, `FAILED` and `OUTSIDE`;
+    `impacts` is the number of impacts in one period of the orbit, or one of `STICKING`,
+    `CONTACT` and `UNCOUNTED`.
     """
 
     impacts: np.ndarray
-    """Impacts of one orbit, or one of `STICKING`, `CONTACT`, `UNCOUNTED`."""
+    """Number of impacts per orbit, or one of `STICKING`, `CONTACT` and `UNCOUNTED`."""
     turns: np.ndarray
     """Period in forcing periods (or points, on other sections), or one of `APERIODIC`,
-    `ESCAPED`, `FAILED`, `OUTSIDE`."""
+    `ESCAPED`, `FAILED` and `OUTSIDE`.
+    """
 
 
 def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
-    """Return the smallest period of each lane, in points; 0 where there is none.
+    """Return the smallest period of each lane, in points; 0 if there is none.
 
-    A motion that spirals in towards an orbit appears, for a while, to have a
-    multiple of its period. It counts as not periodic until its points stop
-    approaching.
+    A motion that spirals in towards an orbit temporarily appears to have a multiple of
+    its period. It counts as non-periodic until its points stop approaching the orbit.
 
     Args:
         states: Samples, shape `(lanes, keep, n)`; periods up to `keep / 2` are
-            detected, so that each occurs twice.
+            detected, so each is observed twice.
         period_tolerance: Allowed difference of two states, relative to `sizes`.
-        sizes: Scale of each component, shape `(lanes, n)`; default its largest value.
+        sizes: Scale of each component, shape `(lanes, n)`; default: its largest value.
 
     Returns:
         Shape `(lanes,)`.
@@ -95,7 +95,7 @@ def label(
     Args:
         samples: Samples of a section.
         period_tolerance: As for [`jaxcam.sweeps.attractors.periods`][].
-        impacting: Whether impacts are counted; they are not for a map.
+        impacting: Whether impacts are counted; for a map, they are not.
         sizes: As for [`jaxcam.sweeps.attractors.periods`][].
 
     Returns:

@@ -6,18 +6,18 @@ from scipy.spatial import KDTree
 
 
 def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, int]:
-    """Return pairs of orbits with the least sum of distances.
+    """Match orbits in pairs so that the sum of the distances is smallest.
 
     Args:
-        first: Orbits, shapes `(k, points, n)` and `(l, points, n)`, padded with NaN.
-        second: Orbits, shapes `(k, points, n)` and `(l, points, n)`, padded with NaN.
+        first: Orbits, shape `(k, points, n)`, padded with NaN.
+        second: Orbits, shape `(l, points, n)`, padded with NaN.
         scale: Unit of the distances, shape `(n,)`.
-        most: Largest distance of a pair.
-        labels: Of both, shapes `(k, 2)` and `(l, 2)`; with them, only orbits of one
-            label are a pair.
+        most: Largest allowed distance of a pair.
+        labels: Labels of both, shapes `(k, 2)` and `(l, 2)`; if given, only orbits with
+            the same label are matched.
 
     Returns:
-        For each matched index of `second`, that of its partner in `first`.
+        For each matched index of `second`, the index of its partner in `first`.
     """
     if not len(first) or not len(second):
         return {}
@@ -26,7 +26,7 @@ def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, in
     if labels is not None:
         same = np.all(labels[1][:, None] == labels[0][None], axis=-1)
         cost = np.where(same, cost, far)
-    # a pair that is too far apart costs as much as no pair
+    # a pair that is too far apart has the same cost as no pair
     rows, columns = linear_sum_assignment(np.minimum(cost, most))
     return {
         int(b): int(a) for b, a in zip(rows, columns, strict=True) if cost[b, a] < most

@@ -27,13 +27,13 @@ def settle(
         section: The section.
         states: Initial states, shape `(lanes, n)`.
         turns: Number of periods.
-        keep: Number of samples kept.
+        keep: Number of samples to keep.
         period_tolerance: Tolerance for detecting periods.
-        reruns: Number of extensions of non-periodic runs, each twice as long as the one
-            before.
-        where: Picks a parameter, or several.
+        reruns: Number of extensions of non-periodic runs, each twice as long as the
+            previous one.
+        where: Selects one or more parameters.
         values: Value of the parameter in each lane.
-        progress: Called with the fraction of the periods done.
+        progress: Called with the fraction of periods completed.
 
     Returns:
         Samples and labels.

@@ -6,13 +6,14 @@ import numpy as np
 def unique_rows(table) -> tuple[np.ndarray, np.ndarray]:
     """Return the unique rows of a table in order, and the index of each row.
 
-    **Arguments:** a table of numbers, shape `(rows, columns)`; without columns all rows
-    are the same.
+    **Arguments:** a table of numbers, shape `(rows, columns)`; without columns, all
+    rows are equal.
 
     Returns:
         The different rows, shape `(number, columns)`, and an index into them, shape
-            `(rows,)`. As `numpy.unique(table, axis=0, return_inverse=True)`, which
-            sorts rows as records and takes several times as long.
+            `(rows,)`. The result is that of `numpy.unique(table, axis=0,
+            return_inverse=True)`, which sorts rows as records and takes several times
+            as long.
     """
     table = np.asarray(table)
     rows = np.arange(len(table))

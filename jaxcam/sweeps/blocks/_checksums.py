@@ -16,15 +16,15 @@ from ._store import FORMAT, SWEEP, VERSION
 
 UNFINISHED = -1
 CHECKSUM = "checksum"
-# attributes with the checksums of the combined results and of the coordinates: xarray
-# would replace a lost coordinate by 0, 1, 2, ...
+# attributes with the checksums of the combined results and of the coordinates, because
+# xarray would replace a lost coordinate by 0, 1, 2, ...
 TOGETHER, AXES = "together", "axes"
 # exceptions of zarr and its codecs for damaged chunks and metadata
 UNREADABLE = (OSError, ValueError, RuntimeError, TypeError, LookupError, AttributeError)
 
 
 def faults(group: zarr.Group) -> list[str]:
-    """Return the fault of each block, or an empty text where it is intact."""
+    """Return the fault of each block; empty if the block is intact."""
     units, size = int(group.attrs["units"]), int(group.attrs["block"])  # pyright: ignore
     found = []
     for block in range(-(-units // size)):
@@ -77,8 +77,8 @@ def open_store(path: str | Path) -> xarray.Dataset:
 
 def damaged(path: str | Path) -> ValueError:
     return ValueError(
-        f"{path}: what describes the sweep (zarr.json, coordinates) is damaged; remove "
-        "the folder, and run the sweep again"
+        f"{path}: the description of the sweep (zarr.json, coordinates) is damaged; "
+        "remove the folder, and run the sweep again"
     )
 
 
@@ -90,7 +90,7 @@ def read_block(group: zarr.Group, block: int) -> dict[str, np.ndarray]:
 
 
 def checked(path: str | Path) -> xarray.Dataset:
-    """Open the dataset on disk after a check of all its blocks.
+    """Open the dataset on disk after checking all its blocks.
 
     Raises:
         ValueError: Blocks are missing or damaged; the message names them.

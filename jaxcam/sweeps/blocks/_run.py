@@ -76,13 +76,13 @@ def run_blocks(
     workers: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Store:
-    """Compute the missing blocks of a sweep and store each as it finishes.
+    """Compute the missing blocks of a sweep and store each when it is finished.
 
     Args:
         job: The sweep.
-        out: Folder of a Zarr group; default in memory.
-        resume: Continue with the content of the folder. Missing or damaged blocks are
-            computed again.
+        out: Folder for a Zarr group; by default, results are kept in memory.
+        resume: Whether to continue with the content of the folder. Missing or damaged
+            blocks are recomputed.
         executor: Any `concurrent.futures.Executor`; default `workers` threads. Results
             do not depend on it.
         workers: Number of threads; default one per core.
@@ -92,7 +92,7 @@ def run_blocks(
         The store with the results.
 
     Raises:
-        ValueError: The folder holds something else.
+        ValueError: The folder contains something else.
         RuntimeError: Workers were lost. An interruption (Ctrl-C) loses only the blocks
             in progress.
     """
@@ -106,7 +106,7 @@ def run_blocks(
     workers = 1 if job.chained else workers
     own = ThreadPoolExecutor(workers) if executor is None else nullcontext(executor)
     with own as pool:
-        # enough that no worker waits for the next block, but a small number
+        # enough blocks that no worker waits for the next one, but not many
         width = 2 * (getattr(pool, "_max_workers", None) or _workers_of(pool))
         if job.chained:
             width = 1
@@ -144,8 +144,8 @@ def _take(store: Store, future: Future, block: int, todo) -> None:
         done = store.finished()
         left = [b for b in todo if not done[b]]
         raise RuntimeError(
-            f"a worker was lost; blocks {names_of(left)} are not done: run the sweep "
-            "again with resume=True to compute them"
+            f"a worker was lost; blocks {names_of(left)} are not finished: run the "
+            "sweep again with resume=True to compute them"
         ) from error
     store.write(block, arrays)
 

@@ -27,14 +27,14 @@ class StoredVariable(NamedTuple):
 
 
 class StoreLayout(NamedTuple):
-    """Layout of a stored sweep: `units` along the first dimension, `block` at a
-    time.
+    """Layout of a stored sweep: `units` along the first dimension, in blocks of
+    `block`.
     """
 
     units: int
     """Length of the first dimension."""
     block: int
-    """Units per block."""
+    """Number of units per block."""
     variables: Mapping[str, StoredVariable]
     """Arrays by name."""
     coordinates: Mapping[str, tuple[str, Any, Mapping[str, Any]]]

@@ -1,4 +1,4 @@
-"""Check initial states of lanes of a hybrid system, and compute default starts."""
+"""Check initial states of a hybrid system, and compute default starts."""
 
 import sys
 
@@ -17,14 +17,14 @@ from ._samples import BEHIND
 
 
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
-"""Numbers of motions that advance together, by upper limits of the total."""
+"""Numbers of motions that advance together, for upper limits of the total number."""
 
 
 def chunk_rows(width: int) -> int:
-    """Return the attempts between two checks of the batch, a compromise of waste and
-    checks.
+    """Return the number of attempts between two checks of the batch, a compromise
+    between waste and checks.
     """
-    # few batch elements gain from fewer checks
+    # a small batch gains from fewer checks
     return 1024 if width < 16 else 64
 
 
@@ -33,7 +33,7 @@ def smallest_gaps(
 ):
     """Return the smallest gap of each state at `t0`, shape `(lanes,)`.
 
-    `room` times its resolution is added to each.
+    `room` times its resolution is added to each gap.
     """
     batched, shared = split_lanes(as_arrays(system), where, values)
     parts = jnp.asarray(t0, float), _rows(states), jnp.asarray(room, float)
@@ -41,7 +41,7 @@ def smallest_gaps(
 
 
 def admissible(system: HybridSystem, t0, states, where=None, values=None):
-    """Return whether each state is finite and in front of every constraint at `t0`."""
+    """Return whether each state is finite and not behind any constraint at `t0`."""
     states = np.asarray(states, dtype=float)
     finite = np.all(np.isfinite(states), axis=1)
     batched, shared = split_lanes(as_arrays(system), where, values)
@@ -60,8 +60,8 @@ def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndar
 
 
 def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.ndarray:
-    """Return the state in contact, without velocity relative to the constraint, at
-    `t0`.
+    """Return the state in contact at `t0` with zero velocity relative to the
+    constraint.
 
     Raises:
         ValueError: A state does not have two components, or there are several
@@ -113,7 +113,7 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     Args:
         run: `run(states, values, width)` returns arrays with one row for each
             lane, the last of them the code.
-        lanes: Largest number of motions that advance together.
+        lanes: Maximum number of motions that advance together.
         tails: Shapes of a row of the arrays.
 
     Returns:
@@ -124,14 +124,14 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     values = None if values is None else np.asarray(values, dtype=float)
     ready = admissible(system, t0, states, where, values)
     count = len(states)
-    # few widths, as each needs a separate program; several motions per position, so
-    # that few positions are idle at the end
+    # few widths, because each needs a separate program; several motions per position,
+    # so that few positions are idle at the end
     width = 1 if count == 1 else next(w for most, w in _WIDTHS if count <= most)
     width = min(lanes, width)
     code = np.full(count, BEHIND)
     if not np.any(ready):
         return (*(np.full((count, *tail), np.nan) for tail in tails), code)
-    # inadmissible lanes, and those missing in a block, repeat an admissible lane
+    # inadmissible lanes, and lanes missing in a block, repeat an admissible lane
     one = int(np.argmax(ready))
     index = np.full(max(count, width), one)
     index[:count] = np.where(ready, np.arange(count), one)
@@ -183,7 +183,7 @@ def _lifted(batched, shared, t0, states):
         def worst(x):
             return jnp.min(gaps(system, t0, x))
 
-        # the gap is nearly linear over such distances; Newton along its gradient
+        # the gap is nearly linear over such distances: Newton steps along its gradient
         for _ in range(6):
             gap, slope = jax.value_and_grad(worst)(state)
             state = state + jnp.maximum(-gap, 0.0) * slope / jnp.sum(slope * slope)

@@ -1,4 +1,4 @@
-"""The impact section: a point at every impact."""
+"""The impact section, with a point at every impact."""
 
 from typing import NamedTuple
 
@@ -35,8 +35,9 @@ class ImpactSection(AbstractSystemSection):
     period: float | None = None
     """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     settings: Settings | None = None
-    """Accuracy; default a tolerance of 1e-9 and chatter listed down to a hundredth of
-    the fastest rebound."""
+    """Accuracy settings; by default, the tolerance is 1e-9 and chatter is listed down
+    to a hundredth of the fastest rebound.
+    """
     lanes: int = eqx.field(default=128, static=True)
     """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     max_steps: int = eqx.field(default=1_000_000, static=True)
@@ -99,7 +100,7 @@ class _Row(NamedTuple):
 
 def _found(numbers, impacts, keep):
     """Return states, times and flags of completed chatter; and the last state."""
-    # the newest impact goes last; a ring that is not full starts with NaN
+    # the latest impact is last; a buffer that is not full starts with NaN
     order = (impacts[:, None] + np.arange(keep)) % keep
     rows = np.take_along_axis(numbers, order[..., None], axis=1)
     rests = (rows[..., 0] == float(RowKind.LAST_IMPACT)).astype(float)

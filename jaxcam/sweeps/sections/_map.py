@@ -1,4 +1,4 @@
-"""Sweep plain maps like sections of a flow."""
+"""Sweep maps in the same way as sections of a flow."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,9 +15,9 @@ from ._section import AbstractSection
 
 
 class Map(AbstractSection):
-    """A map `function(state, parameters) -> state`; a period is one iteration.
+    """A map `function(state, parameters) -> state`; one period is one iteration.
 
-    A motion that diverges keeps the points it had; its code is 3.
+    A motion that diverges keeps its points so far; its code is 3.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -30,11 +30,11 @@ class Map(AbstractSection):
     function: Callable[[Float[Array, " n"], Any], Float[Array, " n"]] = eqx.field(
         static=True
     )
-    """Written with `jax.numpy`, state of shape `(n,)`."""
+    """The map, written with `jax.numpy`, for a state of shape `(n,)`."""
     system: Any
-    """Its parameters, any pytree of numbers."""
+    """Parameters of the map, any pytree of numbers."""
     t0: float
-    """Number of the first iteration."""
+    """Index of the first iteration."""
     components: tuple[tuple[str, str], ...] = eqx.field(static=True)
     """Name and unit of each component of the state; default x1, x2, ..."""
     regular: bool = eqx.field(static=True)

@@ -1,4 +1,4 @@
-"""Sample any Poincare section by single trajectories."""
+"""Sample any Poincare section, one trajectory at a time."""
 
 from collections.abc import Callable
 
@@ -16,8 +16,8 @@ class PoincareSection(AbstractSystemSection):
     """Poincare section: crossings of `function(t, state) = 0`, with their times.
 
     Motions are computed one after the other by
-    [`jaxcam.simulate`][jaxcam.hybrid.simulate]: suited to dozens of them, slow for
-    thousands.
+    [`jaxcam.simulate`][jaxcam.hybrid.simulate], which is suitable for dozens of motions
+    but slow for thousands.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -29,15 +29,15 @@ class PoincareSection(AbstractSystemSection):
     system: HybridSystem
     """A [`jaxcam.hybrid.HybridSystem`][]."""
     function: Callable = eqx.field(static=True)
-    """Smooth scalar function of time and state, in `jax.numpy`."""
+    """Smooth scalar function of time and state, written with `jax.numpy`."""
     direction: int = eqx.field(default=1, static=True)
     """+1 for rising crossings, -1 for falling ones, 0 for both."""
     t0: float = 0.0
     """Start time (s)."""
     period: float | None = None
-    """Length of a period (s); default the system's forcing period."""
+    """Length of a period (s); default: the forcing period of the system."""
     settings: Settings | None = None
-    """Accuracy; default that of `simulate`."""
+    """Accuracy settings; default: those of `simulate`."""
     regular: bool = eqx.field(default=False, static=True, init=False)
     """Samples are not one period apart."""
     impacting: bool = eqx.field(default=True, static=True, init=False)

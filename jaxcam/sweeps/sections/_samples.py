@@ -9,21 +9,23 @@ class Samples(NamedTuple):
     """The last points of many motions on a section, as NumPy arrays."""
 
     states: np.ndarray
-    """Points, shape `(lanes, keep, n)`; NaN where a lane failed or has fewer points."""
+    """Points, shape `(lanes, keep, n)`; NaN if a lane failed or has fewer points."""
     times: np.ndarray
     """Times of the points (s, or iterations of a map), shape `(lanes, keep)`."""
     hits: np.ndarray
-    """Impacts since the previous point, shape `(lanes, keep)`."""
+    """Number of impacts since the previous point, shape `(lanes, keep)`."""
     rests: np.ndarray
-    """Completed chatter sequences since the previous point, shape `(lanes, keep)`."""
-    final: np.ndarray
-    """State at the end, a whole number of periods after the start, shape `(lanes, n)`.
+    """Number of completed chatter sequences since the previous point, shape `(lanes,
+    keep)`.
     """
+    final: np.ndarray
+    """Final state, a whole number of periods after the start, shape `(lanes, n)`."""
     contact: np.ndarray
     """Whether contact lasted throughout, shape `(lanes,)`."""
     code: np.ndarray
-    """0, or the reason of a failure: an index into `RESULTS`, or `BEHIND`; shape
-    `(lanes,)`."""
+    """0, or the reason for a failure: an index into `RESULTS`, or `BEHIND`; shape
+    `(lanes,)`.
+    """
 
 
 BEHIND = -1
@@ -42,7 +44,7 @@ def with_lanes(old: Samples, which, new: Samples) -> Samples:
 
 
 def filled(samples: Samples, keep: int) -> Samples:
-    """Return the samples padded to an equal number for each lane."""
+    """Return the samples padded to the same number for each lane."""
     missing = keep - samples.states.shape[1]
     if missing == 0:
         return samples

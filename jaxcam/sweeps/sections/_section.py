@@ -1,4 +1,4 @@
-"""Define sections, the points at which a motion is sampled."""
+"""Sections, which define the points at which a motion is sampled."""
 
 import abc
 from collections.abc import Callable
@@ -14,14 +14,16 @@ from ._samples import Samples
 class AbstractSection(eqx.Module):
     """A sampling method for many motions of one system.
 
-    A lane is one motion. Its samples depend on its start and its parameters alone, not
-    on the other lanes; everything else in this package relies on that.
+    A lane is one motion. Its samples depend only on its start and its parameters, not
+    on the other lanes; the rest of the package relies on this.
     """
 
     system: AbstractVar[Any]
-    """Its leaves are the parameters."""
+    """The system, whose leaves are the parameters."""
     regular: AbstractVar[bool]
-    """Whether samples are one period apart, so that a label P(m, n) means n periods."""
+    """Whether samples are one period apart, so that n in a label P(m, n) is in
+    periods.
+    """
     impacting: AbstractVar[bool]
     """Whether impacts are counted."""
 
@@ -41,9 +43,9 @@ class AbstractSection(eqx.Module):
             states: Initial state of each lane, shape `(lanes, n)`.
             turns: Number of periods.
             keep: Number of points.
-            where: Picks a parameter, or several.
-            values: Value of the parameter in each lane, shape `(lanes,)`, or one row
-                per lane.
+            where: Selects one or more parameters.
+            values: Value of the parameter in each lane, shape `(lanes,)`, or one row of
+                values per lane.
 
         Returns:
             [`jaxcam.sweeps.sections.Samples`][]. A lane that cannot start has the code
@@ -52,7 +54,7 @@ class AbstractSection(eqx.Module):
 
     @abc.abstractmethod
     def starts(self, where: Callable | None = None, values=None) -> np.ndarray:
-        """Return the default start of each lane.
+        """Return the default initial state of each lane.
 
         Returns:
             Shape `(lanes, n)`.
@@ -63,10 +65,10 @@ class AbstractSection(eqx.Module):
 
     @abc.abstractmethod
     def turn(self, where: Callable | None = None, values=None) -> np.ndarray:
-        """Return the length of a period (s, or iterations).
+        """Return the length of a period (s, or iterations of a map).
 
         Returns:
-            Shape `(lanes,)`, or `(1,)` for all.
+            Lengths, shape `(lanes,)`, or `(1,)` if they are equal.
         """
 
     def sizes(
@@ -78,8 +80,9 @@ class AbstractSection(eqx.Module):
     ) -> np.ndarray:
         """Return the scale of each component in each lane.
 
-        Two states are equal if their difference is small compared with it. By
-        default the largest value among the start (`states`) and the samples.
+        Two states are equal if their difference is small compared with this scale. The
+        default is the largest value among the initial states (`states`) and the
+        samples.
 
         Returns:
             Shape `(lanes, n)`.
@@ -95,7 +98,7 @@ class AbstractSection(eqx.Module):
 
     @abc.abstractmethod
     def names(self, n: int) -> tuple[tuple[str, str], ...]:
-        """Return name and unit of each of the `n` components of a state."""
+        """Return the name and unit of each of the `n` components of a state."""
 
 
 def system_names(system, n: int) -> tuple[tuple[str, str], ...]:
@@ -109,7 +112,7 @@ def system_names(system, n: int) -> tuple[tuple[str, str], ...]:
 
 def component_coordinates(components) -> dict:
     """Return names and units of the state components, as coordinates of a dataset."""
-    # Zarr specifies strings of variable length, but not of fixed length
+    # the Zarr format specifies strings of variable length, but not of fixed length
     names = np.array([name for name, _ in components], dtype=object)
     units = np.array([unit for _, unit in components], dtype=object)
     return {

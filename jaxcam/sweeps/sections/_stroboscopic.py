@@ -1,4 +1,4 @@
-"""Define the stroboscopic section: once per forcing period."""
+"""The stroboscopic section, with one point per forcing period."""
 
 import equinox as eqx
 import numpy as np
@@ -22,16 +22,17 @@ class Stroboscopic(AbstractSystemSection):
     system: HybridSystem
     """A [`jaxcam.hybrid.HybridSystem`][]."""
     t0: float = 0.0
-    """Start time (s); its phase is that of the samples."""
+    """Start time (s), which determines the phase of the samples."""
     period: float | None = None
-    """Sampling period (s); default the system's forcing period."""
+    """Sampling period (s); default: the forcing period of the system."""
     settings: Settings | None = None
-    """Accuracy; default a tolerance of 1e-9 and chatter completed as soon as the theory
-    allows."""
+    """Accuracy settings; by default, the tolerance is 1e-9 and chatter is completed as
+    soon as the theory allows.
+    """
     lanes: int = eqx.field(default=128, static=True)
     """Number of motions advanced together in one compiled program."""
     max_steps: int = eqx.field(default=1_000_000, static=True)
-    """Budget of attempted steps per motion in one call."""
+    """Maximum number of attempted steps per motion in one call."""
     regular: bool = eqx.field(default=True, static=True, init=False)
     """Samples are one period apart."""
     impacting: bool = eqx.field(default=True, static=True, init=False)

@@ -9,13 +9,13 @@ from ._section import AbstractSection, system_names
 
 
 class AbstractSystemSection(AbstractSection):
-    """A section of the motions of a hybrid system that start at one time."""
+    """A section for motions of a hybrid system that start at the same time."""
 
     system: AbstractVar[HybridSystem]
     t0: AbstractVar[float]
     """Start time (s)."""
     period: AbstractVar[float | None]
-    """Length of a period (s); None for the system's own forcing period."""
+    """Length of a period (s); None for the forcing period of the system."""
 
     def starts(self, where=None, values=None) -> np.ndarray:
         return state_in_contact(self.system, self.t0, where, values)

@@ -15,10 +15,10 @@ def compute(system: CamFollower) -> Rows:
     run = released_turn(system, complete)
     speeds = -np.asarray(run.impacts.speed_before)
     return [
-        ("impacts listed before the rest are summed", np.nan, len(speeds), ""),
+        ("impacts resolved before chatter is completed", np.nan, len(speeds), ""),
         ("fastest impact", np.nan, np.max(speeds), "rad/s"),
         (
-            "slowest of them over the fastest",
+            "ratio of slowest to fastest impact",
             np.nan,
             np.min(speeds) / np.max(speeds),
             "",

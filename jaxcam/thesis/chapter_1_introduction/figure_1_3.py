@@ -12,7 +12,7 @@ from ..target import Rows, Target
 
 
 _COMPLETE, _INTERRUPTED = 152.65, 152.69
-"""Printed speeds of Figure 1.3 (rpm), either side of the interruption."""
+"""Printed speeds of Figure 1.3 (rpm), on either side of the interruption."""
 
 
 def both_sides(system: CamFollower) -> tuple[float, float]:
@@ -47,4 +47,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("Chatter, complete and interrupted", compute, draw)
+TARGET = Target("Complete and interrupted chatter", compute, draw)

@@ -1,1 +1,1 @@
-"""Chapter 2: dynamical systems, smooth and not."""
+"""Chapter 2: smooth and nonsmooth dynamical systems."""

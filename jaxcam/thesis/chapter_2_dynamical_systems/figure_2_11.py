@@ -20,7 +20,7 @@ MAPS = {
     "piecewise-linear, discontinuous": SkewMap(*_numbers(0.5, 0.4, 0.3, -1.0)),
     "square root": SquareRootMap(*_numbers(0.5, 0.1)),
 }
-"""The three maps of Figure 2.11, which gives no numbers."""
+"""The three maps of Figure 2.11; the parameter values are ours."""
 
 
 def compute(system: CamFollower) -> Rows:
@@ -29,7 +29,7 @@ def compute(system: CamFollower) -> Rows:
     skew = MAPS["piecewise-linear, continuous"]
     assert isinstance(skew, SkewMap)
     found = border_collision(skew, lambda s: s.mu, 0.2)
-    rows.append(("continuous: border collision at mu", 0.0, found.parameter, ""))
+    rows.append(("continuous: border collision, mu", 0.0, found.parameter, ""))
     for name, mu in (("continuous", -0.3), ("continuous", 0.3)):
         period = map_attractor(SkewMap(*_numbers(skew.a, skew.b, mu))).period
         rows.append((f"{name}, mu = {mu}: period", np.nan, period, ""))

@@ -1,4 +1,5 @@
-"""Figure 2.13 and (2.43): the Zeno ball, by events and by time-stepping.
+"""Figure 2.13 and thesis, eq. (2.43): the Zeno ball by event detection and
+time-stepping.
 
 The thesis gives the formula; the parameters of the ball are ours.
 """
@@ -21,26 +22,28 @@ from ..target import Rows, Target
 
 _BALL = BouncingBall(jnp.asarray(9.81), jnp.asarray(0.7))
 _LAUNCH = 1.0
-# numbers of steps over which an error is averaged, over that in the middle
+# numbers of steps over which an error is averaged, relative to the middle one
 _NEIGHBOURS = (0.92, 0.96, 1.0, 1.04, 1.08)
 
 
 class Zeno(NamedTuple):
-    """The bouncing ball up to contact, by events and by steps of three lengths."""
+    """The bouncing ball up to contact, with event detection and with three step
+    lengths.
+    """
 
     exact: float
-    """Accumulation time (2.43)."""
+    """Accumulation time (thesis, eq. (2.43))."""
     run: Trajectory
     steps: SteppedMotion
-    """With the fewest steps."""
+    """Run with the fewest steps."""
     counts: tuple[int, ...]
     rests: np.ndarray
-    """Accumulation time of each number of steps (s)."""
+    """Accumulation time for each number of steps (s)."""
 
 
 @cache
 def zeno() -> Zeno:
-    """Compute the ball once, for the numbers and the drawing."""
+    """Simulate the ball once, for both the table and the figure."""
     gravity, r = float(_BALL.gravity), float(_BALL.restitution)
     exact = 2 * _LAUNCH / (gravity * (1 - r))
     start, end = np.array([0.0, _LAUNCH]), 1.2 * exact
@@ -53,9 +56,9 @@ def zeno() -> Zeno:
 
 @cache
 def errors() -> tuple[np.ndarray, np.ndarray]:
-    """Return step lengths (s) and errors of the accumulation time (s), averaged.
+    """Return step lengths (s) and averaged errors of the accumulation time (s).
 
-    The error is a sawtooth function of the place of the impacts in their steps, so it
+    The error is a sawtooth function of where the impacts fall within their steps, so it
     is averaged over neighbouring numbers of steps.
     """
     found = zeno()
@@ -73,7 +76,12 @@ def compute(system: CamFollower) -> Rows:
     gravity, r = float(_BALL.gravity), float(_BALL.restitution)
     found = zeno()
     rows: Rows = [
-        ("accumulation time, by events", found.exact, found.run.contacts.start[-1], "s")
+        (
+            "accumulation time, event detection",
+            found.exact,
+            found.run.contacts.start[-1],
+            "s",
+        )
     ]
     for steps, rest in zip(found.counts, found.rests, strict=True):
         rows.append((f"accumulation time, {steps} time steps", found.exact, rest, "s"))
@@ -108,13 +116,13 @@ def draw(system: CamFollower) -> Figure:
     axes[1].loglog(middle, mean, "o", color=FLIGHT, label="mean of five")
     level = np.exp(np.mean(np.log(mean / middle)))
     axes[1].loglog(middle, level * middle, "--", color="0.6", label="order one")
-    # over less than two decades the labels of minor ticks overlap
+    # the labels of minor ticks overlap on an axis of less than two decades
     axes[1].xaxis.set_minor_formatter(NullFormatter())
     axes[1].yaxis.set_minor_formatter(NullFormatter())
-    axes[1].set_xlabel("length of a step (s)")
+    axes[1].set_xlabel("step length (s)")
     axes[1].set_ylabel("error of the accumulation time (s)")
     axes[1].legend()
     return figure
 
 
-TARGET = Target("The Zeno ball, by events and by steps", compute, draw)
+TARGET = Target("The Zeno ball, with events and with time steps", compute, draw)

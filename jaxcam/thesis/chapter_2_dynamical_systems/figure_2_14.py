@@ -1,4 +1,4 @@
-"""Figure 2.14 (d): a branch over the belt's speed, with both kinds of event.
+"""Figure 2.14 (d): a branch in the belt speed, with its sliding bifurcations.
 
 The figure is a sketch; the parameters of the oscillator are ours.
 """
@@ -21,22 +21,22 @@ from ..target import Rows, Target
 
 
 BELT = BeltOscillator(*(jnp.asarray(v) for v in (1.0, 0.4, 0.0, 0.05, 0.9, 0.7)))
-"""A forced mass with Coulomb friction on a belt, whose speed varies."""
+"""A forced mass with Coulomb friction on a belt; the belt speed is the parameter."""
 _BELTS = np.linspace(0.05, 1.5, 59)
 _SETTLE = 30
 DRAWN = 0.2, 0.7, 1.1, 1.4
-"""Belt speeds of the drawn orbits, one between any two events."""
+"""Belt speeds of the orbits drawn, one in each interval between events."""
 
 
 class Belted(NamedTuple):
-    """The motion of a mass on a belt of constant speed, over one forcing period."""
+    """The motion of a mass on a belt at constant speed, over one forcing period."""
 
     belt: float
     highest: float
-    """Largest velocity; time of sticking over the period."""
+    """Largest velocity; fraction of the period spent sticking."""
     stuck: float
     crossings: int
-    """Crossings of the surface that do not stick."""
+    """Number of surface crossings without sticking."""
     run: FilippovTrajectory
 
 
@@ -57,20 +57,20 @@ def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
 
 @cache
 def belt_branch() -> list[Belted]:
-    """Compute motions over the belt speed, downwards, each from the previous one."""
+    """Compute motions at decreasing belt speeds, each from the previous one."""
     made, state = [], (0.0, 0.0)
-    for belt in counted("simulating a speed of the belt", _BELTS[::-1]):
+    for belt in counted("simulating belt speed", _BELTS[::-1]):
         made.append(belted(belt, state))
         state = tuple(np.asarray(made[-1].run.final))
     return made[::-1]
 
 
 class SlidingEvent(NamedTuple):
-    """A speed of the belt at which the sequence of switches changes."""
+    """A belt speed at which the sequence of switches changes."""
 
     belt: float
     beyond: float
-    """Rate at which the field beyond the surface leaves it, at the orbit's arrival."""
+    """Rate at which the field beyond the surface leaves it, where the orbit arrives."""
 
 
 def _sticks(one: Belted) -> bool:
@@ -82,10 +82,10 @@ def _crosses(one: Belted) -> bool:
 
 
 def _between(holds, first: Belted, second: Belted) -> float:
-    """Bisect the speed at which a property is lost from the first to the second."""
+    """Find by bisection the speed between two motions at which a property is lost."""
     inside, outside = first.belt, second.belt
     state = tuple(np.asarray(second.run.final))
-    for _ in counted("bisecting the speed of the belt, step", range(24)):
+    for _ in counted("bisecting the belt speed, step", range(24)):
         middle = (inside + outside) / 2
         yes = holds(belted(middle, state))
         inside, outside = (middle, outside) if yes else (inside, middle)
@@ -131,9 +131,10 @@ def _rate_beyond(belt: float, name: str) -> float:
 
 
 def grazing_in_closed_form() -> float:
-    """Return the belt speed that the motion without sticking just reaches.
+    """Return the belt speed just reached by the motion without sticking.
 
-    Below the belt friction is constant, so the motion is harmonic about it.
+    Friction is constant while the mass is slower than the belt, so the motion is
+    harmonic about a shifted equilibrium.
     """
     omega, damping = float(BELT.omega), float(BELT.damping)
     size = np.hypot(1 - omega**2, 2 * damping * omega)
@@ -145,7 +146,7 @@ def compute(system: CamFollower) -> Rows:
     events = sliding_events()
     rows: Rows = [
         (
-            "grazing-sliding, closed form beside simulated",
+            "grazing-sliding, closed form against simulation",
             grazing_in_closed_form(),
             events["grazing-sliding"].belt,
             "",
@@ -153,13 +154,15 @@ def compute(system: CamFollower) -> Rows:
     ]
     for name in ("switching-sliding", "crossing-sliding"):
         rows.append((f"{name}: belt", np.nan, events[name].belt, ""))
-        words = f"{name}: field beyond the surface there, beside tangency"
+        words = f"{name}: rate of the field beyond the surface (0: tangent)"
         rows.append((words, 0.0, events[name].beyond, ""))
     for belt in DRAWN:
         one = min(belt_branch(), key=lambda b: abs(b.belt - belt))
         words = f"belt {one.belt:.3g}"
-        rows.append((f"{words}: part of a turn that sticks", np.nan, one.stuck, ""))
-        rows.append((f"{words}: crossings a turn", np.nan, one.crossings, ""))
+        rows.append(
+            (f"{words}: fraction of the period that sticks", np.nan, one.stuck, "")
+        )
+        rows.append((f"{words}: crossings per period", np.nan, one.crossings, ""))
     return rows
 
 
@@ -176,8 +179,8 @@ def draw(system: CamFollower) -> Figure:
     styles = zip(events.items(), (":", "-.", "--"), strict=True)
     for (name, event), dashes in styles:
         top.axvline(event.belt, color=IMPACT, ls=dashes, lw=1.4, label=name)
-    top.set_xlabel("speed of the belt (–)")
-    top.set_ylabel("part of a turn that sticks (–)")
+    top.set_xlabel("belt speed (–)")
+    top.set_ylabel("fraction of period sticking (–)")
     top.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     names = ("crosses", "crosses and sticks", "sticks", "slips")
     drawn = zip(DRAWN, names, strict=True)

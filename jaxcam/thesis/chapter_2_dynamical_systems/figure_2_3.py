@@ -1,4 +1,6 @@
-"""Figure 2.3: attractors of the logistic map by cobwebs; formulas as printed."""
+"""Figure 2.3: cobweb diagrams of the logistic map, compared with the printed
+formulas.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,7 +13,7 @@ from ..target import Rows, Target
 
 
 COBWEBS = ((1.5, 0.8), (3.3, 0.6), (3.8, 0.1))
-"""Parameter and start of the three cobwebs."""
+"""Parameters and starting point of the three cobweb diagrams."""
 
 
 def compute(system: CamFollower) -> Rows:
@@ -39,4 +41,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("Cobwebs of the logistic map", compute, draw)
+TARGET = Target("Cobweb diagrams of the logistic map", compute, draw)

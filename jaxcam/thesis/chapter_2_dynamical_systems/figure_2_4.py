@@ -1,4 +1,6 @@
-"""Figure 2.4 and (2.17): the ratio of the period-doubling cascade."""
+"""Figure 2.4 and thesis, eq. (2.17): the Feigenbaum ratio of the period-doubling
+cascade.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,4 +1,6 @@
-"""Figure 2.7: attracting branches on either side of each normal form's point."""
+"""Figure 2.7: attracting branches on either side of the bifurcation of each normal
+form.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,4 +1,4 @@
-"""Figure 2.8: the saddle, in closed form and numerically; its multipliers.
+"""Figure 2.8: a saddle, in closed form and numerically, with its multipliers.
 
 The figure is a sketch of a flow; this one shows an impact oscillator.
 """
@@ -22,14 +22,14 @@ from ..target import Rows, Target
 
 
 _OMEGA, _RESTITUTION = 2.8, 0.8
-"""The oscillator of Figure 2.8: forcing and restitution; its wall permits a pair of
-orbits with one impact per period.
+"""Forcing and restitution of the oscillator of Figure 2.8; with its wall position, a
+pair of orbits with one impact per period exists.
 """
 _LENGTH = 0.6
 
 
 class Strobe(eqx.Module):
-    """The map of one period of an impact oscillator."""
+    """The stroboscopic map of an impact oscillator."""
 
     system: ImpactOscillator
 
@@ -38,7 +38,7 @@ class Strobe(eqx.Module):
 
 
 class BackwardStrobe(eqx.Module):
-    """The inverse of that map: the motion in reversed time."""
+    """Its inverse: the motion in reversed time."""
 
     system: ImpactOscillator
 
@@ -51,7 +51,7 @@ class Manifolds(NamedTuple):
 
     saddle: Saddle
     exact: np.ndarray
-    """The same saddle, by the closed form of orbits with one impact per period."""
+    """The same saddle from the closed form of orbits with one impact per period."""
     unstable: list[np.ndarray]
     stable: list[np.ndarray]
 
@@ -61,7 +61,7 @@ def manifolds() -> Manifolds:
     """Return the manifolds of the saddle that a fold of P(1,1) creates.
 
     With V the speed before the impact, (k^2 + m^2) V^2 + 2 k sigma V + sigma^2 -
-    gamma^2 = 0 for orbits with one impact a turn; the saddle has the smaller V.
+    gamma^2 = 0 for orbits with one impact per period; the saddle has the smaller V.
     """
     r, period = _RESTITUTION, 2 * np.pi / _OMEGA
     gamma = 1 / (1 - _OMEGA**2)

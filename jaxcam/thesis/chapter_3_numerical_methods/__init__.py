@@ -1,1 +1,1 @@
-"""Chapter 3: numerical methods and continued branches."""
+"""Chapter 3: numerical methods and continuation of branches."""

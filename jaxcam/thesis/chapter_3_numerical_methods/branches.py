@@ -1,4 +1,4 @@
-"""Continue branches over the cam speed."""
+"""Continue branches in the cam speed."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Figure 3.11: the two jumps of the flow, of the velocity and of the phase."""
+"""Figure 3.11: the two discontinuities of the flow, in velocity and in phase."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -20,8 +20,8 @@ SPEED = 147.941373499943
 
 @remembered
 def periodic_run(system: CamFollower, turns: float = 2.0) -> Trajectory:
-    """Return the P(1,1) orbit of Figures 3.8 (a) and 3.11, from half a turn after an
-    impact.
+    """Return the P(1,1) orbit of Figures 3.8 (a) and 3.11, starting half a turn after
+    an impact.
 
     Raises:
         ValueError: The rig has no such orbit.
@@ -32,7 +32,7 @@ def periodic_run(system: CamFollower, turns: float = 2.0) -> Trajectory:
     rig = at_rpm(system, SPEED)
     orbit = orbit_at(system, start, SPEED)
     period = float(rig.period)
-    # half a turn later it is in flight
+    # half a turn later the follower is in flight
     time = float(orbit.times[0]) + period / 2
     state = simulate(rig, orbit.states[0], time - period / 2, time).final
     return simulate(rig, state, time, time + turns * period)
@@ -44,8 +44,8 @@ def compute(system: CamFollower) -> Rows:
     jump = after[0, 1] - before[0, 1]
     back = np.max(np.abs(np.asarray(run.final - run.steps.state[0])))
     return [
-        ("jump of the velocity at the impact", np.nan, jump, "rad/s"),
-        ("jump of the angle there", 0.0, after[0, 0] - before[0, 0], "rad"),
+        ("velocity jump at the impact", np.nan, jump, "rad/s"),
+        ("angle jump at the impact", 0.0, after[0, 0] - before[0, 0], "rad"),
         ("closing of the orbit after two turns", 0.0, back, ""),
         ("impacts in two turns", 2, len(before), ""),
     ]

@@ -53,7 +53,7 @@ def compute(system: CamFollower) -> Rows:
     return [
         ("fold", FOLD_SPEED, fold, "rpm"),
         ("first flip", FLIP_SPEED, special_speed(branch, "flip"), "rpm"),
-        ("saddles followed behind the fold, to", np.nan, highest, "rpm"),
+        ("saddles followed beyond the fold, to", np.nan, highest, "rpm"),
         ("orbits on the branch", np.nan, len(branch.regular), ""),
     ]
 

@@ -34,7 +34,9 @@ from .figure_3_11 import periodic_run
 
 _RANGE = (138.0, 153.5)
 _NEAR_FOLD, _BEYOND = 12, 0.1
-"""Points below that, and the excess of the sum of multipliers beyond the fold's."""
+"""Points below that, and by how much the sum of the multipliers exceeds its value at
+the fold.
+"""
 
 
 class SmoothBranch(NamedTuple):
@@ -59,7 +61,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
         lost = np.full(points, np.nan)
         return SmoothBranch(speeds, lost, np.full((points, 2), np.nan), np.nan, np.nan)
     angles, values = np.zeros(points), np.zeros((points, 2), dtype=complex)
-    # in both directions from the known orbit, each from its neighbour
+    # in both directions from the known orbit, each orbit from its neighbour
     middle = int(np.argmin(np.abs(speeds - SEARCH)))
     orbit = start
     for walk in (range(middle, points), range(middle - 1, -1, -1)):
@@ -83,7 +85,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
 def _around_the_fold(system: CamFollower, orbit, rpm: float):
     """Return speed (rpm), angle and multipliers of orbits from `rpm` through the fold.
 
-    Around the fold the sum of the multipliers is monotonic, the speed is not.
+    Around the fold the sum of the multipliers is monotonic, whereas the speed is not.
     """
     point = SpecialPoint(jnp.asarray(rpm_to_rad_s(rpm)), orbit)
     matrix = np.asarray(compiled_monodromy(at_rpm(system, rpm), orbit))
@@ -106,9 +108,19 @@ def compute(system: CamFollower) -> Rows:
     rows = [
         ("fold", FOLD_SPEED, branch.fold, "rpm"),
         ("first flip", FLIP_SPEED, branch.flip, "rpm"),
-        ("last speed with both multipliers inside", np.nan, inside.max(), "rpm")
+        (
+            "highest speed with both multipliers inside the unit circle",
+            np.nan,
+            inside.max(),
+            "rpm",
+        )
         if len(inside)
-        else ("last speed with both multipliers inside", np.nan, np.nan, "rpm"),
+        else (
+            "highest speed with both multipliers inside the unit circle",
+            np.nan,
+            np.nan,
+            "rpm",
+        ),
     ]
     return rows
 
@@ -129,7 +141,7 @@ def draw(system: CamFollower) -> Figure:
             speed, 1.01, word, ha="center", transform=axes[2].get_xaxis_transform()
         )
     axes[2].set_xlabel("speed (rpm)")
-    axes[2].set_ylabel("angle at the impact (rad)")
+    axes[2].set_ylabel("angle at impact (rad)")
     return figure
 
 

@@ -1,4 +1,6 @@
-"""Figure 3.9: the beginning of P(inf,1), and the zero of its sticking time."""
+"""Figure 3.9: the start of the P(inf,1) branch, and where its sticking time
+vanishes.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -30,9 +32,7 @@ _PAST = 0.01
 
 @remembered
 def sticking_branch(system: CamFollower) -> "Branch":
-    """Follow P(inf,1) from the beginning of impacts to the interruption of
-    chattering.
-    """
+    """Follow P(inf,1) from detachment to the interruption of chatter."""
     import continuation
 
     rig = at_rpm(system, START_RPM)
@@ -95,8 +95,8 @@ def draw(system: CamFollower) -> Figure:
         axes[1].axvline(scale * point.parameter, color=SECOND, ls=":", lw=1.2)
     axes[1].axhline(0, color="0.4", lw=0.7)
     axes[1].set_xlabel("speed (rpm)")
-    axes[1].set_ylabel("sticking time in a turn (ms)")
+    axes[1].set_ylabel("sticking time per turn (ms)")
     return figure
 
 
-TARGET = Target("The branch that sticks, to its interruption", compute, draw)
+TARGET = Target("The sticking branch up to its interruption", compute, draw)

@@ -1,1 +1,1 @@
-"""Chapter 4: the cam-follower, its rig and the experiment."""
+"""Chapter 4: the cam-follower model, the rig and the experiment."""

@@ -9,11 +9,11 @@ from ..remember import remembered
 
 
 DWELL = 60.0, 10.0
-"""Waiting and storage time at each speed (s) (section 4.7)."""
+"""Waiting and recording time at each speed (s) (section 4.7)."""
 UP, DOWN = (120.0, 200.0), (200.0, 150.0)
 """First and last speed (rpm) of the upward and the downward sweep."""
 _STEP = {"default": 0.5, "full": 0.1}
-"""Speed step (rpm); not printed."""
+"""Speed step (rpm); not given in the thesis."""
 
 
 def _speeds(ends: tuple[float, float], step: float) -> np.ndarray:
@@ -27,8 +27,8 @@ def _speeds(ends: tuple[float, float], step: float) -> np.ndarray:
 def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.Diagram]:
     """Simulate both sweeps: up from contact, and down from the end of the first.
 
-    At each speed the cam turns for a minute, and then for ten seconds whose motion is
-    stored once per period. The motion continues at the next speed.
+    At each speed the cam turns for a minute; the motion is then sampled once per period
+    for ten seconds, and continues at the next speed.
     """
     step = _STEP[size]
     forward = sweeps.diagram(
@@ -53,8 +53,8 @@ def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.D
 
 
 EXPERIMENT_NOTE = (
-    "At each speed a minute passes and ten seconds are stored, as printed, forward "
-    "from 120 to 200 rpm and backward to 150; the distance of speeds is not printed. "
-    "The rig is the simulated one, so it meets the events of the model: Table 5.1 "
-    "prints those of the real one, too. Backward ends before P(1,1) does."
+    "As in the thesis, ten seconds are recorded after a minute at each speed, forward "
+    "from 120 to 200 rpm and backward to 150 rpm; the thesis does not give the speed "
+    "step. The rig is simulated, so the events are those of the model; Table 5.1 also "
+    "gives those of the real rig. The backward sweep ends before P(1,1) does."
 )

@@ -1,6 +1,6 @@
 """Figure 4.13: free motion of the follower, with the fitted M = J/K.
 
-The recording behind the figure and the angle it starts from are not printed.
+The thesis gives neither the recording behind the figure nor its initial angle.
 """
 
 import diffrax
@@ -17,14 +17,14 @@ from ..target import Rows, Target
 
 
 _LET_GO = 0.75
-"""Angle at which the free follower is released (rad); not printed."""
+"""Angle at which the free follower is released (rad); not given in the thesis."""
 _HANGING = (-1.55, 0.0)
-"""Range in which the rest angle of the spring is searched for (rad)."""
+"""Range in which the equilibrium angle is searched for (rad)."""
 
 
 @eqx.filter_jit
 def _spring(system, angle):
-    """Return the torque of the spring at an angle, and its stiffness there."""
+    """Return the spring torque at an angle, and the stiffness there."""
     torque = jax.grad(system.potential_energy)
     return torque(angle), jax.grad(torque)(angle)
 
@@ -65,7 +65,7 @@ def compute(system: CamFollower) -> Rows:
     ratio = system.inertia / system.stiffness
     return [
         ("M = J/K", 0.043 / 105, ratio, "m s^2"),
-        ("angle of equilibrium", np.nan, rest, "rad"),
+        ("equilibrium angle", np.nan, rest, "rad"),
         ("frequency of small oscillations about it", np.nan, frequency, "Hz"),
     ]
 
@@ -79,4 +79,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("The follower without its cam", compute, draw)
+TARGET = Target("The follower without the cam", compute, draw)

@@ -13,11 +13,13 @@ from ..target import Rows, Target
 
 
 CONTACT_SPEED, DETACHMENT = 110.0, 125.0
-"""Speed of the figure, and detachment speed (section 5.2)."""
+"""Speed of the figure, and speed of detachment (section 5.2)."""
 
 
 def constrained_run(system: CamFollower, rpm: float = CONTACT_SPEED) -> Trajectory:
-    """Simulate two turns at a speed, from the orbit in contact if it exists."""
+    """Simulate two turns at a speed, from the orbit in permanent contact if there is
+    one.
+    """
     rig = at_rpm(system, rpm)
     return simulate(rig, None, 0.0, 2 * float(rig.period))
 
@@ -31,10 +33,10 @@ def compute(system: CamFollower) -> Rows:
     return [
         ("period", 60 / CONTACT_SPEED, rig.period, "s"),
         ("impacts in two turns", 0, run.impacts.count, ""),
-        ("least contact torque (4.10)", np.nan, load.min(), "N m"),
-        ("largest contact torque (4.10)", np.nan, load.max(), "N m"),
-        ("lowest angle of contact", np.nan, lift.min(), "rad"),
-        ("highest angle of contact", np.nan, lift.max(), "rad"),
+        ("least contact torque (thesis, eq. (4.10))", np.nan, load.min(), "N m"),
+        ("largest contact torque (thesis, eq. (4.10))", np.nan, load.max(), "N m"),
+        ("lowest contact angle", np.nan, lift.min(), "rad"),
+        ("highest contact angle", np.nan, lift.max(), "rad"),
         ("detachment", DETACHMENT, rad_s_to_rpm(float_speed(rig).speed), "rpm"),
     ]
 

@@ -1,7 +1,7 @@
-"""Figure 4.15: restitution by speed, next to what Table 5.2 implies.
+"""Figure 4.15: restitution against speed, compared with what Table 5.2 implies.
 
-The line itself is not printed; the product of the two multipliers of an orbit with
-one impact is r^2.
+The thesis does not print the line itself; the product of the two multipliers of an
+orbit with one impact is r^2.
 """
 
 import jax.numpy as jnp
@@ -36,4 +36,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("Restitution by speed", compute, draw)
+TARGET = Target("Restitution against speed", compute, draw)

@@ -1,6 +1,6 @@
-"""Figure 4.16, simulated part: the impacts of a turn at four speeds.
+"""Figure 4.16, simulated part: the impacts of one turn at four speeds.
 
-Heights are angles over the cam; their ratio shows the loss in an impact.
+Heights are angles above the cam; their ratio shows the loss at an impact.
 """
 
 import matplotlib.pyplot as plt
@@ -25,9 +25,11 @@ def compute(system: CamFollower) -> Rows:
         heights = []
         for start, end in zip(edges[:-1], edges[1:], strict=True):
             heights.append(float(np.max(run.gap(np.linspace(start, end, 200)[1:-1]))))
-        rows.append((f"{rpm:g} rpm: first flight's height", np.nan, heights[0], "rad"))
+        rows.append(
+            (f"{rpm:g} rpm: height of the first flight", np.nan, heights[0], "rad")
+        )
         for k, height in enumerate(heights[1:]):
-            name = f"{rpm:g} rpm: bounce {k + 1} over the flight before"
+            name = f"{rpm:g} rpm: height of bounce {k + 1} relative to the one before"
             rows.append((name, np.nan, height / heights[k], ""))
         rows.append((f"{rpm:g} rpm: sticking time", np.nan, sticking_time(run), "s"))
     return rows

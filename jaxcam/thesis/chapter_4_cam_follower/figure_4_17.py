@@ -1,6 +1,6 @@
 """Figure 4.17: the events of the experiment of section 4.7.
 
-The downward sweep ends at 150 rpm, so no lower speed can be found for P(1,1).
+The downward sweep ends at 150 rpm, so P(1,1) cannot be followed to a lower speed.
 """
 
 import matplotlib.pyplot as plt
@@ -19,8 +19,8 @@ def compute(system: CamFollower, size: str) -> Rows:
     found = events(*experiment(system, size))
     rows = []
     for words, rig, model, value in zip(WORDS, RIG, MODEL, found, strict=True):
-        rows.append((f"{words}; printed of the rig", rig, value, "rpm"))
-        rows.append((f"{words}; printed of the model", model, value, "rpm"))
+        rows.append((f"{words}; printed for the rig", rig, value, "rpm"))
+        rows.append((f"{words}; printed for the model", model, value, "rpm"))
     return rows
 
 

@@ -1,8 +1,8 @@
-"""Figure 4.18: data of the experiment of section 4.7, forward and backward.
+"""Figure 4.18: data from the experiment of section 4.7, forward and backward.
 
 The printed values are those of section 4.7.1 for the upward sweep. In the downward
-sweep the model, whose follower can rise without limit, has orbits that do not fit into
-a real rig, as the largest angle among the samples shows.
+sweep the model, whose follower can rise without limit, has orbits that no real rig
+could follow, as the largest sampled angle shows.
 """
 
 import matplotlib.pyplot as plt
@@ -16,7 +16,7 @@ from .experiment import DWELL, experiment, EXPERIMENT_NOTE, UP
 
 
 _WIDE = 1.0 - 1e-9
-"""Smallest range (rpm) of a listed label."""
+"""Smallest speed range (rpm) for which a label is listed."""
 
 
 def compute(system: CamFollower, size: str) -> Rows:
@@ -32,7 +32,12 @@ def compute(system: CamFollower, size: str) -> Rows:
         turn = 2 * np.pi / made.values
         rows += [
             (f"{way}: speeds", np.nan, len(made.values), ""),
-            (f"{way}: least stored at a speed", DWELL[1], np.min(stored * turn), "s"),
+            (
+                f"{way}: shortest time stored at a speed",
+                DWELL[1],
+                np.min(stored * turn),
+                "s",
+            ),
             (f"{way}: samples", np.nan, stored.sum(), ""),
         ]
         angles = made.states[:, 0, :, 0]

@@ -7,7 +7,7 @@ from ..releases import released_target
 
 
 TARGET = released_target(
-    "Interruption of chattering",
+    "Interruption of chatter",
     (155.0, 1),
     (158.0, np.nan),
     (160.0, 0),

@@ -1,7 +1,7 @@
-"""Figure 4.5: angles of the segments, and the jumps of derivatives.
+"""Figure 4.5: angles of the segments, and discontinuities of the derivatives.
 
-"Jumps first" is the order of the first derivative that is not continuous at the
-segment's start. The thesis shows it only in plots.
+"First discontinuous derivative" is the lowest order whose derivative is discontinuous
+at the segment's start. The thesis shows it only in plots.
 """
 
 import numpy as np
@@ -48,7 +48,7 @@ def compute(system: CamFollower) -> Rows:
         here = int(np.argmin(np.abs(degrees - start)))
         sizes = np.abs(np.asarray(jumps[here]))
         order = int(np.argmax(sizes > 1e-9)) if np.any(sizes > 1e-9) else np.nan
-        rows.append((f"{name}: jumps first in derivative", np.nan, order, ""))
+        rows.append((f"{name}: first discontinuous derivative", np.nan, order, ""))
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Table 4.4: the parameters as printed, next to those of a rig.
+"""Table 4.4: the printed parameters, next to those of a rig.
 
 Raises:
     ValueError: The cam is not an eccentric circle.
@@ -11,7 +11,7 @@ from ..target import Rows, Target
 def compute(system: CamFollower) -> Rows:
     cam = system.profile
     if not isinstance(cam, EccentricCircle):
-        raise ValueError("Table 4.4 is about a circular cam; give one as `profile`.")
+        raise ValueError("Table 4.4 is for a circular cam; give one as `profile`.")
     return [
         ("cam radius R", 0.045, cam.radius, "m"),
         ("cam eccentricity e", 0.015, cam.eccentricity, "m"),

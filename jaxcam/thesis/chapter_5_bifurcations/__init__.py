@@ -1,1 +1,1 @@
-"""Chapter 5: bifurcation diagrams, motions, basins, the local map."""
+"""Chapter 5: bifurcation diagrams, motions, basins and the local map."""

@@ -15,29 +15,31 @@ from ..target import Rows, Target
 
 
 _BOX = (0.33, -3.5), (0.6, 3.5)
-"""Default corners of the states."""
+"""Default corners of the state grid."""
 _SHAPE = {"default": 128, "full": 400}
 _TURNS, _KEEP, _RERUNS = 100, 48, 2
 
 
 NO_RINGS = (
-    "The printed figure is of cells and shows rings; motions followed to their end all "
-    "settle on one chaotic attractor."
+    "The printed figure was made by cell mapping and shows rings; motions simulated "
+    "until they settle all end on one chaotic attractor."
 )
 
 
 class Picture(NamedTuple):
-    """A figure of basins: the speed, its labels and its printed points."""
+    """A figure of basins: its speed, labels and printed points."""
 
     rpm: float
     labels: tuple[str, ...]
-    """Labels of its attractors as printed; chaos is "aperiodic"."""
+    """Printed labels of its attractors; chaos is "aperiodic"."""
     points: dict[str, tuple[float, float]]
     low: tuple[float, float] = _BOX[0]
-    """Corners of the states."""
+    """Corners of the state grid."""
     high: tuple[float, float] = _BOX[1]
     reruns: int = _RERUNS
-    """Number of extensions of non-periodic motions, each of doubled length."""
+    """Number of times that a non-periodic motion is extended, doubling its length each
+    time.
+    """
 
 
 def basins_target(title: str, picture: Picture, note: str = "") -> Target:
@@ -52,7 +54,7 @@ def basins_target(title: str, picture: Picture, note: str = "") -> Target:
             _TURNS,
             keep=_KEEP,
             reruns=picture.reruns,
-            progress=of_sweep("simulating the states of the grid"),
+            progress=of_sweep("simulating the grid of states"),
         )
 
     def compute(system: CamFollower, size: str) -> Rows:
@@ -62,7 +64,7 @@ def basins_target(title: str, picture: Picture, note: str = "") -> Target:
             own = [name for name in found.names if name.split(" ")[0] == label]
             rows.append((f"attractors {label}", 1, len(own), ""))
         for name, share in found.shares.items():
-            rows.append((f"part of the states: {name}", np.nan, share.share, ""))
+            rows.append((f"share of the states: {name}", np.nan, share.share, ""))
         return rows
 
     def draw(system: CamFollower, size: str) -> Figure:

@@ -1,4 +1,4 @@
-"""Figure 5.1: speed ranges of each orbit, upwards and downwards."""
+"""Figure 5.1: speed range of each orbit in the upward and downward sweeps."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,9 +13,9 @@ from ..target import Rows, Target
 
 
 TURNS, KEEP = 300, 100
-"""Cycles at each speed and how many are kept, as section 5.2 prints them."""
+"""Cycles at each speed, and how many are kept, as given in section 5.2."""
 _STEP = {"default": 0.25, "full": 0.1}
-"""Speed step (rpm) of Figure 5.1, and its ends."""
+"""Speed step and end points (rpm) of Figure 5.1."""
 _ENDS = 120.0, 170.0
 _SAID = {
     (1, "contact", "to"): 125.0,
@@ -24,12 +24,12 @@ _SAID = {
     (-1, "P(1,1)", "to"): 152.0,
     (-1, "P(4,4)", "from"): 157.5,
 }
-"""Values from the text, sections 5.2.1 and 5.2.2."""
+"""Values from the text of sections 5.2.1 and 5.2.2."""
 
 
 @remembered
 def both_ways(system: CamFollower, size: str) -> sweeps.Diagram:
-    """Compute the diagram of Figure 5.1: upwards from contact, and back."""
+    """Compute the diagram of Figure 5.1: upwards from contact, then downwards."""
     low, high = _ENDS
     speeds = np.linspace(low, high, round((high - low) / _STEP[size]) + 1)
     return sweeps.diagram(

@@ -15,7 +15,7 @@ from .figure_5_1 import KEEP, TURNS
 
 
 _ZOOM = 152.6, 153.2
-"""Speeds (rpm) of Figure 5.11, and their number."""
+"""Speed range (rpm) of Figure 5.11, and number of speeds."""
 _ZOOMED = {"default": 401, "full": 2001}
 
 
@@ -38,7 +38,7 @@ def compute(system: CamFollower, size: str) -> Rows:
     made = onset(system, size)
     speeds = np.asarray(rad_s_to_rpm(made.values))
     labels = made.labels[:, 0]
-    # a failed run gives no information on its speed
+    # a failed run gives no information about its speed
     known = labels != "failed"
     other = known & (labels != "P(inf,1)")
     first = speeds[other].min() if np.any(other) else np.nan
@@ -49,7 +49,12 @@ def compute(system: CamFollower, size: str) -> Rows:
     return [
         ("first speed without P(inf,1)", 152.67, first, "rpm"),
         ("interruption", INTERRUPTION, exact, "rpm"),
-        ("part of the speeds behind it that repeat", np.nan, np.mean(repeats), ""),
+        (
+            "share of the speeds above it with a periodic motion",
+            np.nan,
+            np.mean(repeats),
+            "",
+        ),
         ("changes between windows and chaos", np.nan, changes, ""),
         ("speeds at which the run failed", np.nan, np.count_nonzero(~known), ""),
     ]

@@ -1,4 +1,4 @@
-"""Figure 5.12: orbits reached from random starts, and their speeds."""
+"""Figure 5.12: orbits reached from random initial states, and their speeds."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,18 +13,20 @@ from ..target import Rows, Target
 
 
 _MONTE_CARLO = 152.0, 160.0
-"""Figure 5.12: speeds (rpm), starts at each, cycles and kept cycles; number of
-speeds.
+"""Settings of Figure 5.12: speed range (rpm), initial states per speed, cycles, cycles
+kept, and number of speeds.
 """
 _STARTS, _MC_TURNS, _MC_KEEP = 20, 100, 50
 _DRAWN = {"default": 161, "full": 801}
 BOX = (0.34, -3.0), (0.55, 3.0)
-"""Box from which its starts are drawn."""
+"""Box from which the initial states are drawn."""
 
 
 @remembered
 def drawn_diagram(system: CamFollower, size: str) -> sweeps.Diagram:
-    """Compute the diagram of Figure 5.12, with new random starts at each speed."""
+    """Compute the diagram of Figure 5.12, with new random initial states at each
+    speed.
+    """
     speeds = np.linspace(*_MONTE_CARLO, _DRAWN[size])
     states = sweeps.monte_carlo(*BOX, _STARTS, 0, len(speeds))
     return sweeps.diagram(
@@ -34,7 +36,7 @@ def drawn_diagram(system: CamFollower, size: str) -> sweeps.Diagram:
         states,
         turns=_MC_TURNS,
         keep=_MC_KEEP,
-        progress=of_sweep("sweeping the speed from random starts"),
+        progress=of_sweep("sweeping the speed from random initial states"),
     )
 
 
@@ -44,8 +46,12 @@ def compute(system: CamFollower, size: str) -> Rows:
     rows: Rows = []
     cascades = {
         "sticking orbit": ("P(inf,1)",),
-        "orbit with one impact a turn, doubled": ("P(2,2)", "P(4,4)", "P(8,8)"),
-        "orbit with three turns, or doubled": ("P(3,3)", "P(6,6)", "P(12,12)"),
+        "doublings of the orbit with one impact per turn": (
+            "P(2,2)",
+            "P(4,4)",
+            "P(8,8)",
+        ),
+        "orbit of three turns and its doublings": ("P(3,3)", "P(6,6)", "P(12,12)"),
     }
     met = 0
     for name, labels in cascades.items():
@@ -67,4 +73,4 @@ def draw(system: CamFollower, size: str) -> Figure:
     return figure
 
 
-TARGET = Target("Coexistence, from random starts", compute, draw, sized=True)
+TARGET = Target("Coexistence, from random initial states", compute, draw, sized=True)

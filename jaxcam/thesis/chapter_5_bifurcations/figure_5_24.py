@@ -1,4 +1,6 @@
-"""Figure 5.24: the sticking time falls to zero by a power law near a square root."""
+"""Figure 5.24: the sticking time falls to zero by a power law close to a square
+root.
+"""
 
 import equinox as eqx
 import jax
@@ -18,7 +20,7 @@ from ..target import Rows, Target
 
 
 _BELOW = 152.65
-"""Speed (rpm) at which the time is given."""
+"""Speed (rpm) at which the sticking time is given."""
 
 
 @eqx.filter_jit
@@ -33,9 +35,10 @@ def _sticking(system, speeds):
 
 @remembered
 def sticking_times(system: CamFollower) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return speeds (rpm) up to the interruption, sticking times (s), interruption.
+    """Return speeds (rpm) up to the interruption, sticking times (s) and the
+    interruption.
 
-    Times are exact for any length; distances to the interruption are spaced
+    Sticking times are exact however short; distances to the interruption are spaced
     logarithmically.
     """
     end = float(rad_s_to_rpm(interruption(system).speed))
@@ -54,9 +57,9 @@ def compute(system: CamFollower) -> Rows:
     below = beside_interruption(system, _BELOW)
     at = np.interp(below, speeds, times)
     return [
-        ("where sticking ends", 152.67, end, "rpm"),
-        ("exponent of its fall (a square root in the text)", 0.5, power, ""),
-        ("the same by theory, kappa/2", 0.5, kappa / 2, ""),
+        ("speed at which sticking ends", 152.67, end, "rpm"),
+        ("exponent of the decrease (a square root in the text)", 0.5, power, ""),
+        ("the same from theory, kappa/2", 0.5, kappa / 2, ""),
         (f"sticking time at {below:g} rpm", np.nan, at, "s"),
     ]
 
@@ -67,14 +70,14 @@ def draw(system: CamFollower) -> Figure:
     axes[0].plot(speeds, 1e3 * times, color=FLIGHT)
     axes[0].axvline(end, color=IMPACT, ls=":", lw=1.2)
     axes[0].set_xlabel("speed (rpm)")
-    axes[0].set_ylabel("sticking time in a turn (ms)")
+    axes[0].set_ylabel("sticking time per turn (ms)")
     below = end - speeds
     axes[1].loglog(below, 1e3 * times, color=FLIGHT, label="motion")
     root = times[-1] * np.sqrt(below / below[-1])
-    axes[1].loglog(below, 1e3 * root, "--", color=RECORDED, label="a square root")
+    axes[1].loglog(below, 1e3 * root, "--", color=RECORDED, label="square root")
     axes[1].set_xlabel("speed below the interruption (rpm)")
     axes[1].legend()
     return figure
 
 
-TARGET = Target("Sticking time by speed", compute, draw)
+TARGET = Target("Sticking time against speed", compute, draw)

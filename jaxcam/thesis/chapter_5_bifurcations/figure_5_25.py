@@ -27,11 +27,11 @@ def compute(system: CamFollower) -> Rows:
     state = sticking_state(map_rig(system))[0]
     apart = np.abs(np.diff(lobes.corners))
     rows: Rows = [
-        ("angle that is deviated from", 0.3371, state[0], "rad"),
-        ("lobes told apart", np.nan, len(apart), ""),
+        ("angle of the reference state", 0.3371, state[0], "rad"),
+        ("lobes resolved", np.nan, len(apart), ""),
     ]
     for k, ratio in enumerate(apart[1:] / apart[:-1]):
-        name = f"width of lobe {k + 1} over lobe {k}"
+        name = f"width of lobe {k + 1} relative to lobe {k}"
         rows.append((name, np.exp(M), ratio, ""))
     del local
     return rows
@@ -42,8 +42,8 @@ def draw(system: CamFollower) -> Figure:
     figure, ax = plt.subplots(figsize=(7.2, 5.0))
     plotting.local_map(fitted, lobes, ax)
     ax.set_xlabel("angle at the section (rad)")
-    ax.set_ylabel("angle a turn later (rad)")
+    ax.set_ylabel("angle one turn later (rad)")
     return figure
 
 
-TARGET = Target("The local map, measured", compute, draw)
+TARGET = Target("The measured local map", compute, draw)

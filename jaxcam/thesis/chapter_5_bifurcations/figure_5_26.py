@@ -1,4 +1,4 @@
-"""Figure 5.26: the order of the events, in two lobes next to each other."""
+"""Figure 5.26: the order of the events in two neighbouring lobes."""
 
 from typing import NamedTuple
 
@@ -21,15 +21,15 @@ class LobeEvents(NamedTuple):
 
     fold: float
     border: float
-    """Loss of the fixed point of the inner lobe at the common corner."""
+    """Disappearance of the fixed point of the inner lobe at the common corner."""
     flip: float
 
 
 def lobe_events(local: LocalMap, number: int) -> LobeEvents:
     """Return the events of one lobe as the map is shifted.
 
-    A fixed point of x -> Pi(x + s) at y = x + s belongs to the shift s = y - Pi(y):
-    fold and flip are where the slope at y is 1 and -1.
+    A fixed point of x -> Pi(x + s) at y = x + s belongs to the shift s = y - Pi(y): the
+    fold is where the slope at y is 1, the flip where it is -1.
     """
     beta = np.exp(float(local.M) * np.arange(number + 2))
     corners = float(local.x_inf) + (float(local.x_0 - local.x_inf)) * beta
@@ -43,7 +43,7 @@ def lobe_events(local: LocalMap, number: int) -> LobeEvents:
         k = np.flatnonzero((slope[1:] - value) * (slope[:-1] - value) <= 0)
         return float(shift[k[0]]) if len(k) else np.nan
 
-    # just inside the corner, where the root of the inner lobe begins
+    # just inside the corner, where the square root of the inner lobe begins
     edge = inner - 1e-9 * abs(outer - inner)
     border = edge - float(local(jnp.asarray(edge)))
     return LobeEvents(where(1.0), border, where(-1.0))
@@ -56,10 +56,10 @@ def compute(system: CamFollower) -> Rows:
     inner, outer = lobe_events(local, 1), lobe_events(local, 0)
     named = [
         ("(b) fold: two fixed points in the lobe", inner.fold),
-        ("(c) the one of the lobe inside it ends at the corner", inner.border),
+        ("(c) the fixed point of the inner lobe ends at the corner", inner.border),
         ("(d) flip: period doubling in the lobe", inner.flip),
         ("(e) fold in the next lobe", outer.fold),
-        ("(f) the one of the lobe ends at the corner", outer.border),
+        ("(f) the fixed point of the lobe ends at the corner", outer.border),
     ]
     ordered = all(
         one < other for (_, one), (_, other) in zip(named[:-1], named[1:], strict=True)
@@ -95,7 +95,7 @@ def draw(system: CamFollower) -> Figure:
     x_0, x_inf = float(fitted.x_0), float(fitted.x_inf)
     for ax, (name, shift) in zip(axes.flat, shifts, strict=True):
         _map_with_identity(ax, fitted, shift, x_inf - 0.3 * (x_0 - x_inf), x_0)
-        # points at which the map meets the identity
+        # points at which the map intersects the identity
         y = x_0 - (x_0 - x_inf) * np.linspace(1e-7, 1 - 1e-7, 40001) ** 2
         apart = y - np.asarray(fitted(jnp.asarray(y))) - shift
         near = np.flatnonzero(apart[1:] * apart[:-1] <= 0)
@@ -108,7 +108,7 @@ def draw(system: CamFollower) -> Figure:
         ax.set_title(name)
         ax.tick_params(labelbottom=False, labelleft=False)
     figure.supxlabel("angle at the section")
-    figure.supylabel("a turn later")
+    figure.supylabel("one turn later")
     return figure
 
 

@@ -1,4 +1,5 @@
-"""Figure 5.27: corners of the lobes, by (5.4) with Table 5.3 and simulated.
+"""Figure 5.27: corners of the lobes, from thesis, eq. (5.4), with Table 5.3, and
+simulated.
 
 Distances are from x_0, since the printed map has another offset (docs/chatter.md).
 """

@@ -1,4 +1,4 @@
-"""Figure 5.28: widths of the attractors of map and motion.
+"""Figure 5.28: widths of the attractors of the map and of the motion.
 
 The thesis draws only the map, without a scale of speeds.
 """
@@ -22,14 +22,16 @@ from .figure_5_11 import onset
 
 
 _RANK = 37
-"""Number of the impact at which the local theory starts (docs/chatter.md)."""
+"""Index of the impact at which the local theory starts (docs/chatter.md)."""
 _AFTER = 0.05, 0.1, 0.15
-"""Distances (rpm) from the interruption at which map and motion are compared."""
+"""Distances (rpm) from the interruption at which the map and the motion are
+compared.
+"""
 _SHIFTS = 600
 
 
 class Iterated(NamedTuple):
-    """Figure 5.28: the fitted map next to the motion, both from the sticking state."""
+    """Figure 5.28: the fitted map and the motion, both from the sticking state."""
 
     speeds: np.ndarray
     """(k,) rpm; (k, kept) rad."""
@@ -37,14 +39,14 @@ class Iterated(NamedTuple):
     motion_speeds: np.ndarray
     motion: np.ndarray
     rate: float
-    """Rad by rpm."""
+    """Shift of the map per unit of speed (rad/rpm)."""
     interruption: float
     """rpm."""
 
 
 @remembered
 def iterated(system: CamFollower, size: str) -> Iterated:
-    """Iterate the map along the direction in which motions leave the lobes;
+    """Iterate the map along the direction in which motions leave the lobes, and
     simulate.
     """
     rig = interruption(system)
@@ -79,7 +81,7 @@ def iterated(system: CamFollower, size: str) -> Iterated:
 
 def compute(system: CamFollower, size: str) -> Rows:
     found = iterated(system, size)
-    rows: Rows = [("shift of the map by the speed", np.nan, found.rate, "rad/rpm")]
+    rows: Rows = [("shift of the map per rpm", np.nan, found.rate, "rad/rpm")]
     for after in _AFTER:
         for word, speeds, states in (
             ("motion", found.motion_speeds, found.motion),
@@ -88,13 +90,13 @@ def compute(system: CamFollower, size: str) -> Rows:
             near = np.abs(speeds - found.interruption - after) < 0.01
             rows += [
                 (
-                    f"{word}, {after} rpm on: lowest",
+                    f"{word}, {after} rpm above: lowest",
                     np.nan,
                     np.nanmin(states[near]),
                     "rad",
                 ),
                 (
-                    f"{word}, {after} rpm on: highest",
+                    f"{word}, {after} rpm above: highest",
                     np.nan,
                     np.nanmax(states[near]),
                     "rad",
@@ -121,10 +123,10 @@ def draw(system: CamFollower, size: str) -> Figure:
 
 
 TARGET = Target(
-    "The local map, iterated",
+    "The iterated local map",
     compute,
     draw,
     sized=True,
-    note="Speeds at which the iterated map leaves the largest lobe that was fitted "
-    "have no dots.",
+    note="No dots are drawn at speeds where the iterated map leaves the largest fitted "
+    "lobe.",
 )

@@ -4,5 +4,5 @@ from ..releases import released_target
 
 
 TARGET = released_target(
-    "Chatter, complete and less so", (151.0, 1), (153.5, 0), (153.9, 0)
+    "Complete and incomplete chatter", (151.0, 1), (153.5, 0), (153.9, 0)
 )

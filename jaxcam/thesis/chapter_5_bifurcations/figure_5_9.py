@@ -21,19 +21,19 @@ from .figure_5_1 import KEEP, TURNS
 
 
 _SPEEDS, _IMPACTS = (152.66, 152.882, 153.45), 1500
-"""Printed speeds (rpm), and the number of impacts drawn at each."""
+"""Printed speeds (rpm), and number of impacts drawn at each."""
 
 
 def impact_speeds(system: CamFollower) -> list[float]:
-    """Return the speeds (rpm) of Figure 5.9: one below the interruption, two above
-    it.
+    """Return the speeds (rpm) of Figure 5.9: one below and two above the
+    interruption.
     """
     return [beside_interruption(system, rpm) for rpm in _SPEEDS]
 
 
 @remembered
 def impacts_at(system: CamFollower) -> sweeps.Diagram:
-    """Return the impacts of Figure 5.9, from contact at rest, listed deep into
+    """Return the impacts of Figure 5.9, from contact at rest, resolved deep into
     chatter.
     """
     section = sweeps.ImpactSection(
@@ -50,7 +50,7 @@ def impacts_at(system: CamFollower) -> sweeps.Diagram:
 
 
 def rebound_speeds(system: CamFollower, number: int) -> np.ndarray:
-    """Return the normal velocity (rad/s) after each impact of one speed of Figure
+    """Return the normal velocity (rad/s) after each impact at one speed of Figure
     5.9.
     """
     made = impacts_at(system)
@@ -75,10 +75,12 @@ def compute(system: CamFollower) -> Rows:
     rows: Rows = []
     for k, (rpm, printed) in enumerate(zip(each, (1, np.nan, np.nan), strict=True)):
         share = np.mean(samples.rests[k] > 0)
-        rows.append((f"{rpm:g} rpm: part of the turns that stick", printed, share, ""))
+        rows.append(
+            (f"{rpm:g} rpm: share of the turns with sticking", printed, share, "")
+        )
         phase = made.dataset["phase"].values[k, 0]
         spread = len(np.unique(np.round(phase[np.isfinite(phase)], 6)))
-        rows.append((f"{rpm:g} rpm: different phases of impacts", np.nan, spread, ""))
+        rows.append((f"{rpm:g} rpm: distinct impact phases", np.nan, spread, ""))
     return rows
 
 

@@ -1,6 +1,6 @@
-"""Table 5.1, the simulated column: speeds of the main events.
+"""Table 5.1, simulated column: speeds of the main events.
 
-The two printed rows of the route to chaos and of chaos are not distinguished here.
+The printed rows for the route to chaos and for chaos are not distinguished here.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ WORDS = Events(
     "P(2,2), from",
     "P(2,2) and its doublings, to",
 )
-"""The events, and their speeds (rpm) as printed: of the rig, and of the simulation."""
+"""The events, and their printed speeds (rpm) for the rig and for the simulation."""
 RIG = Events(125, 125, 155, 155, 170, 150, 188, 188, 200)
 MODEL = Events(125, 125, 152, 152.6, 154.5, 135, 151, 152, 170)
 
@@ -41,9 +41,9 @@ def compute(system: CamFollower, size: str) -> Rows:
 
 
 TARGET = Target(
-    "Speeds of the main events, the simulated column",
+    "Speeds of the main events, simulated column",
     compute,
     sized=True,
-    note="Read off the diagram of Figure 5.1, so known to its distance of speeds. "
-    "The printed end of P(2,2) is that of the whole diagram.",
+    note="Read from the diagram of Figure 5.1, and therefore known only to within its "
+    "speed step. The printed end of P(2,2) is the end of the whole diagram.",
 )

@@ -1,8 +1,8 @@
 """Table 5.2: the multipliers of P(1,1), and its fold and flip.
 
 Near the fold the branch is steep in the speed, so the table gives the speed at which
-the multipliers have the printed sum; at other speeds it gives the multipliers. Fold and
-first flip follow, next to the values of section 5.2.1.
+the multipliers have the printed sum; elsewhere it gives the multipliers at the printed
+speed. The fold and the first flip follow, next to the values of section 5.2.1.
 """
 
 import numpy as np
@@ -48,7 +48,7 @@ SPEEDS = np.real(MULTIPLIERS[:, 0])
 TRACES = np.real(MULTIPLIERS[:, 1] + MULTIPLIERS[:, 2])
 PRODUCTS = np.real(MULTIPLIERS[:, 1] * MULTIPLIERS[:, 2])
 NEAR_FOLD = SPEEDS < 140.0
-"""The rows close to the fold, where the multipliers depend strongly on the speed."""
+"""Rows close to the fold, where the multipliers depend strongly on the speed."""
 
 
 # Section 5.2.1: fold of P(1,1), and its flip ("close to")

@@ -1,7 +1,7 @@
 """Table 5.3: constants of the local map at the interruption of chatter.
 
-The polynomial is compared by its value in the middle of the first lobe: its printed
-coefficients multiply powers of 0.34 rad and cancel to a part in a million.
+The polynomial is compared by its value in the middle of the first lobe: the terms with
+the printed coefficients, in powers of about 0.34 rad, cancel to one part in a million.
 """
 
 import jax.numpy as jnp
@@ -19,10 +19,10 @@ from ..target import Rows, Target
 
 
 _MAP_SPEED = 152.6
-"""Speed at which Figure 5.25 is drawn (rpm), and its range of perturbations."""
+"""Speed (rpm) at which Figure 5.25 is drawn, and its range of perturbations."""
 _PERCENT = 1.0
 _DOUBLED = 4
-"""Number of doublings of the range for a rig with other lobes."""
+"""Number of times that the range may be doubled for a rig with different lobes."""
 Q, M, DELTA_PI, DELTA_X = -0.62, -0.535, 2.243e-4, 1.022e-3
 CUBIC = (1695.91, -15119.51, 44927.06, -44486.71)
 ROOT, X_0, P_0, ALPHA, X_INF = 0.12089, 0.33964, 0.33667, 0.33715, 0.33717
@@ -76,4 +76,4 @@ def compute(system: CamFollower) -> Rows:
     ]
 
 
-TARGET = Target("Local map at the interruption of chattering", compute)
+TARGET = Target("Local map at the interruption of chatter", compute)

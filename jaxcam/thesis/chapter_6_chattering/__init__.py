@@ -1,1 +1,1 @@
-"""Chapter 6: chattering and its interruption."""
+"""Chapter 6: chatter and its interruption."""

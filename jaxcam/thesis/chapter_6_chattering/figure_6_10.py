@@ -11,4 +11,4 @@ def draw(system: CamFollower) -> Figure:
     return draw_marks(system, close=True)
 
 
-TARGET = Target("Its chattering, closer", compute_marks, draw)
+TARGET = Target("Chatter of the orbit at 152.67 rpm, enlarged", compute_marks, draw)

@@ -1,4 +1,6 @@
-"""Figure 6.11: impacts predicted by the lambda-map next to the simulated ones."""
+"""Figure 6.11: impacts predicted by the lambda-map, compared with the simulated
+ones.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,12 +14,12 @@ from .table_6_2 import REBOUND_SPEED
 
 
 _AHEAD = 6
-"""Impacts that Figure 6.11 predicts."""
+"""Number of impacts predicted in Figure 6.11."""
 
 
 def local_impacts(system: CamFollower) -> tuple[ChatterSequence, int]:
-    """Return the sequence, and the index of the impact of Table 6.2, by its rebound
-    speed.
+    """Return the sequence, and the index of the impact of Table 6.2, identified by its
+    rebound speed.
     """
     found = sequence(system)
     return found, int(np.argmin(np.abs(np.log(found.speed / REBOUND_SPEED))))
@@ -30,10 +32,12 @@ def compute(system: CamFollower) -> Rows:
     for k, tau in enumerate(hops(found, start, count)[1:]):
         exact = found.tau[start + k + 1]
         rows.append(
-            (f"impact {k + 1} from release, map beside motion", exact, tau, "s")
+            (f"impact {k + 1} from release, map against motion", exact, tau, "s")
         )
     end = hops(found, start, 60)[-1]
-    rows.append(("accumulation from release, the same", found.accumulation, end, "s"))
+    rows.append(
+        ("accumulation from release, map against motion", found.accumulation, end, "s")
+    )
     return rows
 
 
@@ -52,7 +56,7 @@ def draw(system: CamFollower) -> Figure:
         mfc="none",
         mec=IMPACT,
         ms=11,
-        label="times by the lambda-map",
+        label="times from the lambda-map",
     )
     ax.semilogy(1e3 * found.tau[start], found.speed[start], "*", color=SECTION, ms=12,
                 label="start")  # fmt: skip
@@ -63,4 +67,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("Impacts by the local map", compute, draw)
+TARGET = Target("Impacts predicted by the local map", compute, draw)

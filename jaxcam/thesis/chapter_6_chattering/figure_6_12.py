@@ -20,7 +20,7 @@ from .table_6_2 import JERK
 
 @remembered
 def contact_derivatives(system: CamFollower):
-    """Return time over a turn (s), relative acceleration and jerk in contact."""
+    """Return times in one turn (s), and relative acceleration and jerk in contact."""
     found = sequence(system)
     rig = found.system.prepared()
     times = jnp.linspace(0.0, float(rig.period), 2001)
@@ -43,7 +43,7 @@ def compute(system: CamFollower) -> Rows:
         c = jerk[k[0]] + share * (jerk[k[0] + 1] - jerk[k[0]])
     return [
         ("c, the jerk at zero acceleration", JERK, c, "rad/s^3"),
-        ("time of it", RELEASE[0], release, "s"),
+        ("time of release", RELEASE[0], release, "s"),
         ("c, from the release point", JERK, sequence(system).frame.jerk, "rad/s^3"),
     ]
 
@@ -56,7 +56,7 @@ def draw(system: CamFollower) -> Figure:
     release = float(found.frame.release) % period
     figure, axes = plt.subplots(2, 1, figsize=(8.0, 5.6), sharex=True)
     axes[0].plot(drawn.time, drawn.gap[:, 0], color=FLIGHT)
-    axes[0].set_ylabel("over cam (rad)")
+    axes[0].set_ylabel("above cam (rad)")
     axes[1].plot(times, acceleration, color=FLIGHT, label="acceleration (rad/s²)")
     axes[1].plot(times, jerk / 10, "--", color=IMPACT, label="jerk / 10 (rad/s³)")
     axes[1].plot(release, float(found.frame.jerk) / 10, "*", color=SECTION, ms=12,

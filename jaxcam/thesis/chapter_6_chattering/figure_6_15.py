@@ -1,7 +1,7 @@
-"""Figure 6.15: prediction and simulation after the speed has been changed.
+"""Figure 6.15: prediction and simulation after a change of speed.
 
-Below the interruption the motion depends on the speed through release only; the slopes
-are those of Table 6.3, here from simulations.
+Below the interruption the motion depends on the speed only through the release; the
+slopes are those of Table 6.3, here from simulations.
 """
 
 import jax.numpy as jnp
@@ -19,12 +19,12 @@ from .table_6_3 import ANGLE, VELOCITY
 
 
 _CHANGE = 0.001 * 152.67
-"""Largest change of the speed in Figure 6.15 (rpm)."""
+"""Largest change of speed in Figure 6.15 (rpm)."""
 
 
 @remembered
 def rebuilt_parameter(system: CamFollower) -> Rebuilt:
-    """Compute Figure 6.15: the cam speed is changed (rpm)."""
+    """Compute Figure 6.15, in which the cam speed (rpm) is changed."""
     rig, composed = composed_at(system, late=True)
     change = np.linspace(-_CHANGE, _CHANGE, 401)
     rates = jnp.asarray(rpm_to_rad_s(change))
@@ -42,14 +42,24 @@ def compute(system: CamFollower) -> Rows:
         for k in (0, 1)
     )
     return [
-        ("velocity at the section by the speed", VELOCITY, velocity, "rad/s/rpm"),
-        ("angle at the section by the speed", ANGLE, angle, "rad/rpm"),
+        (
+            "derivative of the velocity at the section with respect to speed",
+            VELOCITY,
+            velocity,
+            "rad/s/rpm",
+        ),
+        (
+            "derivative of the angle at the section with respect to speed",
+            ANGLE,
+            angle,
+            "rad/rpm",
+        ),
         ("median error over the range of the velocity", np.nan, error_of(found), ""),
     ]
 
 
 def draw(system: CamFollower) -> Figure:
-    return draw_rebuilt(rebuilt_parameter(system), "change of the speed (rpm)")
+    return draw_rebuilt(rebuilt_parameter(system), "change of speed (rpm)")
 
 
 TARGET = Target("Section after a change of speed", compute, draw)

@@ -1,4 +1,4 @@
-"""Figure 6.16: a full turn by the composed map, without any compensation."""
+"""Figure 6.16: a full turn of the composed map, without any compensation."""
 
 import equinox as eqx
 import jax
@@ -16,7 +16,7 @@ from .rebuilt import composed_at, draw_rebuilt, lobe_rows, Rebuilt
 
 @remembered
 def rebuilt_turn(system: CamFollower) -> Rebuilt:
-    """Compute Figure 6.16: a full turn, from a deviation (rad) along B to the next
+    """Compute Figure 6.16: one full turn, from a deviation (rad) along B to the next
     section.
     """
     rig, composed = composed_at(system, late=True)

@@ -1,4 +1,4 @@
-"""Figure 6.2: the first branches of the grazing manifold, for the rig."""
+"""Figure 6.2: the first branches of the grazing manifold of the rig."""
 
 from matplotlib.figure import Figure
 
@@ -8,7 +8,7 @@ from .manifold import draw_manifold, manifold_of, manifold_rows
 
 
 BRANCHES = 2
-"""Impacts S^k and W^k that are shown."""
+"""Number of impacts S^k and W^k shown."""
 
 
 def compute(system: CamFollower) -> Rows:

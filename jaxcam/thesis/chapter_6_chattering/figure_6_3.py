@@ -23,25 +23,25 @@ from .manifold import manifold_of
 
 
 _UNDER = 1 - 1e-11
-"""Reduction of the initial speed that turns the grazing into an impact above
-rounding; the impact speed grows with its square root.
+"""Reduction of the initial speed that turns the graze into an impact above rounding;
+the impact speed grows with the square root of the reduction.
 """
 
 
 class Series(NamedTuple):
-    """A motion of Figure 6.3, from an impact of the plane of Figure 6.2."""
+    """A motion of Figure 6.3, from an impact in the plane of Figure 6.2."""
 
     name: str
     time: float
     speed: float
     until: float
-    """Time of the graze, or of release."""
+    """Time of the graze or of the release."""
     run: Trajectory
 
 
 @remembered
 def series(system: CamFollower) -> list[Series]:
-    """Compute motions from S^1 and both sides of it, from S^2, from C and from
+    """Compute motions from S^1 and on both sides of it, from S^2, from C and from
     inside D.
     """
     found = manifold_of(system, BRANCHES)
@@ -58,8 +58,8 @@ def series(system: CamFollower) -> list[Series]:
         start = (float(times[middle]), float(speeds[middle]), float(time))
         starts.append((f"{name}: ends in a graze", *start))
     _, time, speed, until = starts[0]
-    starts.insert(0, ("slower than S$^1$: an impact more", time, 0.97 * speed, until))
-    starts.insert(2, ("faster than S$^1$: an impact less", time, 1.03 * speed, until))
+    starts.insert(0, ("slower than S$^1$: one more impact", time, 0.97 * speed, until))
+    starts.insert(2, ("faster than S$^1$: one impact fewer", time, 1.03 * speed, until))
     there = np.flatnonzero(np.isfinite(np.asarray(region.speed)))
     far = there[-len(there) // 8]
     time, speed = float(region.time[far]), float(region.speed[far])
@@ -85,7 +85,7 @@ def compute(system: CamFollower) -> Rows:
             time, speed = jnp.asarray(one.time), jnp.asarray(one.speed) * _UNDER
             for _ in range(int(name[2])):
                 time, speed = impact_map(rig, time, speed)
-            rows.append((f"{name}: speed of that impact", 0.0, speed, "rad/s"))
+            rows.append((f"{name}: speed of the grazing impact", 0.0, speed, "rad/s"))
         count = len(np.asarray(one.run.impacts.time))
         rows.append((f"{name}: impacts listed", np.nan, count, ""))
         rows.append((f"{name}: sticking time", np.nan, sticking_time(one.run), "s"))
@@ -103,7 +103,7 @@ def draw(system: CamFollower) -> Figure:
         ax.plot(hit, np.zeros_like(hit), ".", color=IMPACT, ms=5)
         ax.axhline(0, color="0.4", lw=0.7)
         ax.set_title(one.name, fontsize=11)
-        # the long flight after the grazing would hide it
+        # the long flight after the graze would hide it
         last = 1.25 * (one.until - start)
         near = drawn.time - start <= one.until - start
         top = 1.25 * np.nanmax(drawn.gap[near])
@@ -113,7 +113,7 @@ def draw(system: CamFollower) -> Figure:
     for ax in axes[-1]:
         ax.set_xlabel("time (s)")
     for ax in axes[:, 0]:
-        ax.set_ylabel("over cam (rad)")
+        ax.set_ylabel("above cam (rad)")
     return figure
 
 

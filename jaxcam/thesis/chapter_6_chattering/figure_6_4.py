@@ -8,7 +8,7 @@ from .manifold import draw_manifold, manifold_of, manifold_rows
 
 
 BRANCHES = 5
-"""Impacts S^k and W^k that are shown."""
+"""Number of impacts S^k and W^k shown."""
 
 
 def compute(system: CamFollower) -> Rows:
@@ -19,4 +19,4 @@ def draw(system: CamFollower) -> Figure:
     return draw_manifold(manifold_of(system, BRANCHES), most=4.0)
 
 
-TARGET = Target("More of the grazing manifold", compute, draw)
+TARGET = Target("Further branches of the grazing manifold", compute, draw)

@@ -1,4 +1,4 @@
-"""Figure 6.5: fixed points of f, slopes there; scales next to Table 5.3's."""
+"""Figure 6.5: fixed points of f, its slopes there, and the scales of Table 5.3."""
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ from ..target import Rows, Target
 
 
 def restitution_at(system: CamFollower) -> float:
-    """Return the restitution at the interruption."""
+    """Return the coefficient of restitution at the interruption."""
     rig = interruption(system)
     return float(rig.restitution(rig.speed, jnp.zeros(())))  # pyright: ignore
 
@@ -27,22 +27,22 @@ def compute(system: CamFollower) -> Rows:
     slope = jax.grad(lambda lam: lambda_map(lam, r))
     return [
         ("f at zero", 0.0, lambda_map(0.0, r), ""),
-        ("slope of f at zero, beside r", r, slope(1e-9), ""),
+        ("slope of f at zero, against r", r, slope(1e-9), ""),
         ("lambda-bar", np.nan, law.lambda_bar, ""),
         (
-            "f at lambda-bar less lambda-bar",
+            "f(lambda-bar) - lambda-bar",
             0.0,
             lambda_map(law.lambda_bar, r) - law.lambda_bar,
             "",
         ),
         (
-            "slope there, beside e^-M of Table 5.3",
+            "slope at lambda-bar, against e^-M of Table 5.3",
             np.exp(-M),
             slope(law.lambda_bar),
             "",
         ),
-        ("p^2, beside e^Q of Table 5.3", np.exp(Q), law.p**2, ""),
-        ("largest lambda that returns", 3 / 8, _largest(r), ""),
+        ("p^2, against e^Q of Table 5.3", np.exp(Q), law.p**2, ""),
+        ("largest lambda followed by an impact", 3 / 8, _largest(r), ""),
     ]
 
 
@@ -66,4 +66,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("The scalar map of chattering", compute, draw)
+TARGET = Target("The scalar map of chatter", compute, draw)

@@ -1,4 +1,4 @@
-"""Figure 6.6: tau of each impact over the one before, by h(lambda) and exact."""
+"""Figure 6.6: ratio of successive tau, from h(lambda) and exact."""
 
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
@@ -23,7 +23,7 @@ def compute(system: CamFollower) -> Rows:
             continue
         rows.append(
             (
-                f"tau of impact {k + 2} over impact {k + 1}, h beside exact",
+                f"tau of impact {k + 2} relative to impact {k + 1}, h against exact",
                 hop_ratio(jnp.asarray(lam)),
                 found.tau[k + 1] / found.tau[k],
                 "",
@@ -52,8 +52,8 @@ def draw(system: CamFollower) -> Figure:
     top = 1e3 * np.nanmax(drawn.gap[inside])
     ax.set_ylim(-0.12 * top, 1.15 * top)
     ax.set_xlabel("time from release (s)")
-    ax.set_ylabel("over cam (mrad)")
+    ax.set_ylabel("above cam (mrad)")
     return figure
 
 
-TARGET = Target("Impacts of a chattering sequence", compute, draw)
+TARGET = Target("Impacts of a chatter sequence", compute, draw)

@@ -39,7 +39,7 @@ class Manifold(NamedTuple):
 
 @remembered
 def manifold_of(system: CamFollower, branches: int) -> Manifold:
-    """Return grazing manifold and chattering region at the interruption."""
+    """Return the grazing manifold and the chatter region at the interruption."""
     rig = interruption(system)
     return Manifold(
         rig,
@@ -56,7 +56,7 @@ def _onwards(system, time, speed):
 
 
 def manifold_rows(system: CamFollower, branches: int) -> Rows:
-    """Return rows that check S^1 (next impact without speed) and C (lambda-bar at
+    """Return rows that check S^1 (its next impact has zero speed) and C (lambda-bar at
     release).
     """
     found = manifold_of(system, branches)
@@ -73,17 +73,17 @@ def manifold_rows(system: CamFollower, branches: int) -> Rows:
             np.nanmedian(np.abs(after)),
             "rad/s",
         ),
-        ("lambda of C at release, beside lambda-bar", bar, near, ""),
+        ("lambda of C at release, against lambda-bar", bar, near, ""),
     ]
     for k in range(branches):
         number = np.count_nonzero(np.isfinite(np.asarray(before.speed[k])))
         share = number / before.speed.shape[1]
-        rows.append((f"part of the grazes that S^{k + 1} leads to", np.nan, share, ""))
+        rows.append((f"share of the grazes reached from S^{k + 1}", np.nan, share, ""))
     return rows
 
 
 def draw_manifold(found: Manifold, most: float | None) -> Figure:
-    """Draw both in the plane of time and rebound speed; `most`: highest speed drawn."""
+    """Draw both in the plane of time and rebound speed, up to the speed `most`."""
     figure, ax = plt.subplots(figsize=(7.8, 5.2))
     period = float(found.system.period)
     plotting.chattering_picture(

@@ -1,4 +1,4 @@
-"""Draw the orbit of 152.67 rpm and its marks: Figures 6.7, 6.9 and 6.10."""
+"""Draw the orbit at 152.67 rpm with its marked points: Figures 6.7, 6.9 and 6.10."""
 
 from typing import Any
 
@@ -19,11 +19,11 @@ from .table_6_1 import ACCUMULATION, RELEASE, SECTION_RELATIVE
 
 
 _MARKS = (("^", "accumulation"), ("D", "release"), ("s", "section"))
-"""Triangle, diamond and square of Figures 6.7 to 6.10."""
+"""Triangle, diamond and square markers of Figures 6.7 to 6.10."""
 
 
 def compute_marks(system: CamFollower) -> Rows:
-    """Compute the positions of the marks, next to Table 6.1."""
+    """Compute the marked points, next to the values of Table 6.1."""
     run, found = sticking_turn(system), sequence(system)
     period = float(found.system.period)
     release = float(found.frame.release) % period
@@ -40,7 +40,9 @@ def compute_marks(system: CamFollower) -> Rows:
 
 
 def _marked(system: CamFollower):
-    """Return the curve with gap and rate, the same for the marks, and the period."""
+    """Return the gap and its rate along the orbit and at the marked points, and the
+    period.
+    """
     found, run = sequence(system), sticking_turn(system)
     period = float(found.system.period)
     release = float(found.frame.release) % period
@@ -49,7 +51,7 @@ def _marked(system: CamFollower):
     drawn = trajectory_curve(run, None, 8000)
     cam = states[:, 1] - _cam_velocity(run, times)
     gaps = np.asarray(run.gap(times)).ravel()
-    # of the curve: gap, its rate, without the jumps
+    # gap and its rate along the curve, without the jumps
     rate = drawn.state[:, 1] - _cam_velocity(run, drawn.time)
     return drawn, drawn.gap[:, 0], rate, times, gaps, cam, period
 
@@ -88,10 +90,10 @@ def draw_marks(system: CamFollower, close: bool = False) -> Figure:
         top.plot(time, height, label=name, **style)
         below.plot(time, speed, **style)
         right.plot(height, speed, **style)
-    top.set_ylabel("over cam (mrad)")
+    top.set_ylabel("above cam (mrad)")
     below.set_ylabel("velocity (rad/s)")
     below.set_xlabel("time (s)")
-    right.set_xlabel("over cam (mrad)")
+    right.set_xlabel("above cam (mrad)")
     right.set_ylabel("velocity (rad/s)")
     top.tick_params(labelbottom=False)
     # the section is at the end of the period, and its mark is wider

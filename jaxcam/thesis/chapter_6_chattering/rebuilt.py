@@ -1,4 +1,6 @@
-"""Compute the section after a deviation by the composed map and by simulation."""
+"""Compute the state at the section after a deviation, by composed map and by
+simulation.
+"""
 
 from typing import NamedTuple
 
@@ -22,7 +24,7 @@ _RANK = 37
 
 
 class Rebuilt(NamedTuple):
-    """Deviations, and the predicted and simulated state at the section, `(k, 2)`."""
+    """Deviations, and the predicted and simulated states at the section, `(k, 2)`."""
 
     deviations: np.ndarray
     predicted: np.ndarray
@@ -31,9 +33,7 @@ class Rebuilt(NamedTuple):
 
 
 def composed_at(system: CamFollower, late: bool) -> tuple[CamFollower, ComposedMap]:
-    """Return the rig at its interruption, and the map from D*, or from a late
-    impact.
-    """
+    """Return the rig at its interruption, and the map from D* or from a late impact."""
     rig = interruption(system)
     if late:
         return rig, composed_map(rig, speed_of, _RANK)
@@ -50,7 +50,7 @@ def error_of(found: Rebuilt) -> float:
 
 
 def lobe_rows(found: Rebuilt) -> Rows:
-    """Return the errors of a prediction of the lobes, and their heights."""
+    """Return the error of a prediction of the lobes, and the heights of the lobes."""
     return [
         ("median error over the range of the velocity", np.nan, error_of(found), ""),
         (

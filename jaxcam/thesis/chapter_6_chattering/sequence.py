@@ -20,10 +20,10 @@ class ChatterSequence(NamedTuple):
     system: CamFollower
     frame: ChatterFrame
     tau: np.ndarray
-    """(k,) from release (s), rebound speeds (rad/s)."""
+    """(k,) times from release (s) and rebound speeds (rad/s)."""
     speed: np.ndarray
     accumulation: float
-    """From release (s)."""
+    """Time from release (s)."""
 
 
 @remembered
@@ -42,8 +42,8 @@ def sequence(system: CamFollower) -> ChatterSequence:
 
 
 def hops(found: ChatterSequence, start: int, count: int) -> np.ndarray:
-    """Return times from release of the impacts after one of the sequence, by the
-    lambda-map.
+    """Return the times, from release, of the impacts that follow one of the sequence
+    according to the lambda-map.
     """
     r, tau = float(found.frame.restitution), float(found.tau[start])
     lam = jnp.asarray(found.speed[start] / (found.frame.jerk * tau * tau))

@@ -1,7 +1,7 @@
 """Table 6.1: the end of chatter just below its interruption.
 
 The relative coordinates of the two contact points are not compared: they are zero, and
-the printed values are the thesis' integration error.
+the printed values are integration errors.
 """
 
 import jax.numpy as jnp
@@ -17,10 +17,10 @@ ACCUMULATION = (0.33474, 0.30531, 0.86956)
 """Time in the period (s), angle (rad) and velocity (rad/s) of the follower."""
 RELEASE = (0.33668, 0.30698, 0.84854)
 SECTION_STATE = (0.33717, 0.22313)
-"""At the end of the period: the follower, and the follower less the cam."""
+"""At the end of the period: the follower, and the follower relative to the cam."""
 SECTION_RELATIVE = (0.00494, 0.22315)
 DECIMALS = 5
-"""Digits after the point in the table."""
+"""Decimal places in the table."""
 PERIOD, STICKING = 0.39300, 0.00194
 
 
@@ -55,4 +55,4 @@ def compute(system: CamFollower) -> Rows:
     return rows
 
 
-TARGET = Target("End of chattering below its interruption", compute)
+TARGET = Target("End of chatter below its interruption", compute)

@@ -1,6 +1,6 @@
-"""Table 6.2: the lambda-map from an impact to the accumulation point.
+"""Table 6.2: the lambda-map from an impact up to the accumulation point.
 
-It uses the impact whose rebound speed is nearest to the printed value. Times are given
+The impact with the rebound speed nearest to the printed value is used. Times are given
 from release, since the thesis counts them from an arbitrary turn.
 """
 
@@ -41,9 +41,9 @@ def compute(system: CamFollower) -> Rows:
         ("jerk c at release", JERK, jerk, "rad/s^3"),
         ("lambda at the start", LAMBDA, lam, ""),
         ("accumulation, from release", END - RELEASE, rest, "s"),
-        ("the same by the lambda-map", PREDICTED - RELEASE, there, "s"),
+        ("the same from the lambda-map", PREDICTED - RELEASE, there, "s"),
         (
-            "accumulation after the start, by the lambda-map over exact",
+            "time from start to accumulation, lambda-map relative to exact",
             (PREDICTED - START) / (END - START),
             (there - tau) / (rest - tau),
             "",

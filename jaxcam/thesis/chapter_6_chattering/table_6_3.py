@@ -1,7 +1,7 @@
-"""Table 6.3: derivatives of the local map by the cam speed.
+"""Table 6.3: derivatives of the local map with respect to the cam speed.
 
-The thesis estimates them from perturbed simulations. The dependence of lambda is
-given twice: with D* held, and with D* moving as the orbit does.
+The thesis estimates them from perturbed simulations. The derivative of lambda is given
+twice: with D* held fixed, and with D* moving with the orbit.
 """
 
 import numpy as np
@@ -20,8 +20,8 @@ D_STAR = -0.00194
 
 
 def nearest_impact(rig: CamFollower, release: float, tau: float) -> int:
-    """Return the number of the impact nearest (by ratio) to `tau` before the next
-    release.
+    """Return the index of the impact whose time before the next release is nearest, as
+    a ratio, to `tau`.
     """
     impacts = impacts_from_release(rig, 40)
     found = np.asarray(impacts.time) - release - float(rig.period)
@@ -42,11 +42,11 @@ def compute(system: CamFollower) -> Rows:
     held, moving = float(local.by_parameter) * rpm, float(local.incidence) * rpm
     return [
         ("speed", REFERENCE, rad_s_to_rpm(rig.speed), "rpm"),
-        ("lambda by the speed, D* held", BY_SPEED, held, "1/rpm"),
-        ("lambda by the speed, D* moving", BY_SPEED, moving, "1/rpm"),
-        ("Gamma by the speed", VELOCITY, velocity, "rad/s/rpm"),
-        ("Omega by the speed", ANGLE, gap, "rad/rpm"),
+        ("d lambda/d speed, D* held", BY_SPEED, held, "1/rpm"),
+        ("d lambda/d speed, D* moving", BY_SPEED, moving, "1/rpm"),
+        ("d Gamma/d speed", VELOCITY, velocity, "rad/s/rpm"),
+        ("d Omega/d speed", ANGLE, gap, "rad/rpm"),
     ]
 
 
-TARGET = Target("The speed of the cam in the local map", compute)
+TARGET = Target("The effect of the cam speed on the local map", compute)
