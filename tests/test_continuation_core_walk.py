@@ -229,7 +229,7 @@ def test_a_start_without_a_solution():
     problem = continuation.Equilibrium(
         lambda u, p: u * u + 1.0 + p["mu"] ** 2, {"mu": 0.0}
     )
-    with pytest.raises(ValueError, match="no solution"):
+    with pytest.raises(ValueError, match="not a solution"):
         continuation.follow(problem, [5.0], mu, (-1.0, 1.0))
 
 
