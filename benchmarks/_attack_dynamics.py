@@ -1,4 +1,4 @@
-"""Compute accelerations, gaps and contact forces of a problem with numpy only."""
+"""Compute accelerations, gaps and contact forces of a problem with only numpy."""
 
 import itertools
 
@@ -14,7 +14,7 @@ class Dynamics:
         self.problem = problem
         self.d, self.m = problem.mass.size, problem.offset.size
         self._light = 1 / problem.mass
-        # what an impulse at a gap does to the velocities, one column a gap
+        # velocity change per unit impulse at a gap, one column per gap
         self.across = problem.normals.T * self._light[:, None]
         self.coupling = problem.normals @ self.across
 
@@ -30,7 +30,7 @@ class Dynamics:
         return force * self._light
 
     def jerk(self, t, y, rate):
-        """Rate of the free acceleration, where `y` changes at `rate`."""
+        """Rate of change of the free acceleration when `y` changes at `rate`."""
         p, d = self.problem, self.d
         q = y[:d]
         away = (t - p.kick_time) / p.kick_width
@@ -42,7 +42,7 @@ class Dynamics:
         return force * self._light
 
     def walls(self, t):
-        """Position, velocity, acceleration and jerk of each wall, rows of four."""
+        """Position, velocity, acceleration and jerk of each wall, one row per wall."""
         p = self.problem
         w = p.wall_frequency
         angle = np.multiply.outer(t, w) + p.wall_phase
@@ -82,7 +82,7 @@ class Dynamics:
     def jets(self, t, y, held):
         """Normal acceleration and jerk of each gap while the gaps `held` are closed.
 
-        The contact forces change too; their rate follows from that of the pull.
+        The contact forces also change; their rate follows from that of the pull.
         """
         rate = self.field(t, y, held)
         n = self.problem.normals
@@ -101,17 +101,18 @@ class Dynamics:
         return p.restitution[k] * np.exp(p.softening[k] * velocity)
 
     def struck(self, y, k, velocity):
-        """The state after an impact at gap `k` with this normal velocity."""
+        """The state after an impact at gap `k` with normal velocity `velocity`."""
         jump = -(1 + self.restitution(k, velocity)) * velocity
         after = y.copy()
         after[self.d :] += self.across[:, k] * (jump / self.coupling[k, k])
         return after
 
     def held_of(self, t, y, closed):
-        """Which of the gaps `closed`, all with zero normal velocity, stay in contact.
+        """Those of the gaps `closed`, all with zero normal velocity, that stay in
+        contact.
 
-        It is the set with compressive contact forces for which the other gaps open;
-        `None` if there is no such set beyond rounding.
+        In this set all contact forces are compressive, and all other gaps open; `None`
+        if no set satisfies this to within rounding.
         """
         closed = tuple(sorted(closed))
         for size in range(len(closed), -1, -1):

@@ -6,15 +6,15 @@ import numpy as np
 
 
 class Events(NamedTuple):
-    """Impacts and contacts of a run, in time units of the problem.
+    """Impacts and contacts of a run, in the time units of the problem.
 
     The impacts of a sequence that ends in contact are listed as far as the run resolves
-    them: `sequences` are the time intervals (first, last) of the others.
+    them; the time intervals (first, last) of the unresolved ones are in `sequences`.
     """
 
     # (k, 2): time, constraint
     impacts: np.ndarray
-    # (k, 3): start, end (infinite where it lasts), constraint
+    # (k, 3): start, end (infinite if still in contact), constraint
     contacts: np.ndarray
     sequences: list[tuple[float, float]]
 
@@ -27,7 +27,9 @@ class Mismatch(NamedTuple):
 
 
 def outside(impacts: np.ndarray, sequences, room: float) -> np.ndarray:
-    """The impacts outside all sequences, which exclude their start."""
+    """The impacts outside all sequences, where the first impact of a sequence counts as
+    outside.
+    """
     keep = np.ones(len(impacts), bool)
     for first, last in sequences:
         keep &= ~((impacts[:, 0] > first + room) & (impacts[:, 0] <= last + room))
@@ -41,10 +43,10 @@ def listed(events: Events, other: Events, room: float) -> np.ndarray:
 
 
 def pairs(one: np.ndarray, other: np.ndarray, end: float, room):
-    """Rows of events in order, paired up to `end`.
+    """Pair the rows of two lists of events in order, up to `end`.
 
-    **Arguments:** events with their times first and their constraint last; `room(t)`,
-    by how much times may differ at t.
+    **Arguments:** events, with the time first and the constraint last; `room(t)`, the
+    permitted difference of times at t.
 
     **Returns:** the pairs, and the first `Mismatch` or `None`.
     """
@@ -59,7 +61,7 @@ def pairs(one: np.ndarray, other: np.ndarray, end: float, room):
             return found, Mismatch(nearest, f"one more event of gap {int(row[-1])}")
         row = one.pop(0)
         reach = room(row[0])
-        # events of different gaps at the same time come in any order
+        # simultaneous events of different gaps may come in any order
         near = (
             i
             for i, mate in enumerate(other[:6])

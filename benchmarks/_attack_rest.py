@@ -1,9 +1,9 @@
-"""Follow impacts in ever shorter succession, one by one, until contact.
+"""Follow ever more closely spaced impacts one by one until contact.
 
-Flights too low for an integrator are followed with Taylor series of the full state, to
-the third power of their length; gaps and normal velocities are integrated separately,
-so that the rounding of positions does not matter. A flight of duration s has an error
-of about s^4.
+Flights too low for an integrator are followed with Taylor series of the full state, up
+to the third power of the flight time; gaps and normal velocities are integrated
+separately, so that rounding of the positions does not matter. A flight of duration s
+has an error of about s^4.
 """
 
 from typing import NamedTuple
@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 
-#: hops at most this high are followed here: the longest then lasts about 1e-4
+# : flights up to this height are followed here; the longest lasts about 1e-4
 LOW = 1e-9
-# and at the start a hop changes its acceleration by at most this fraction
+# and at the start the acceleration changes by at most this fraction during a flight
 _STEADY = 0.05
-# rebound speeds that are no longer followed: what is left of the motion is its square
+# below this rebound speed impacts are no longer followed; the remaining height is of
+# the order of its square
 _LAST = 1e-12
-# a gap that has risen this much above `LOW` has left for good
+# a gap that has risen this far above `LOW` is no longer in the sequence
 _AWAY = 100.0
 _MOST = 30_000
 
@@ -30,12 +31,12 @@ class Rest(NamedTuple):
     held: tuple[int, ...]
     # (time, constraint, normal velocity before) of each impact
     impacts: list
-    # whether it ended in contact; else it is not known what happens
+    # whether the sequence ended in contact; otherwise its outcome is unknown
     known: bool
 
 
 def is_low(dynamics, t, y, k, rebound, held) -> bool:
-    """Whether the flight after an impact at gap `k` is low enough for this method."""
+    """Whether the flight after an impact at gap `k` is low enough for this module."""
     _, _, pull, rise = dynamics.jets(t, y, held)
     a, j = pull[k], rise[k]
     low = a < 0 and rebound * rebound <= 2 * LOW * -a
@@ -43,7 +44,7 @@ def is_low(dynamics, t, y, k, rebound, held) -> bool:
 
 
 def follow(dynamics, t, y, k, rebound, held) -> Rest:
-    """Impact after impact from the state just after one at gap `k`."""
+    """Follow the impacts from the state just after one at gap `k`."""
     d, m = dynamics.d, dynamics.m
     gaps, speeds = dynamics.closing(t, y)
     held = set(held)
@@ -84,7 +85,7 @@ def follow(dynamics, t, y, k, rebound, held) -> Rest:
         velocity = speeds[hit]
         gaps[hit] = 0.0
         if velocity >= 0:
-            # it only touches
+            # the gap only grazes
             velocity = 0.0
         impacts.append((t, hit, velocity))
         active.add(hit)
@@ -92,7 +93,7 @@ def follow(dynamics, t, y, k, rebound, held) -> Rest:
         push = jump / dynamics.coupling[hit, hit]
         y[d:] += dynamics.across[:, hit] * push
         speeds += dynamics.coupling[:, hit] * push
-        # an impulse may throw the system off another gap, or press it on
+        # an impulse may open another gap, or press it closed
         touched = [row for row in held if abs(speeds[row]) > _LAST]
         held.difference_update(touched)
         active.update(touched)
@@ -106,7 +107,7 @@ def _landing(gap, speed, pull, rise):
     if gap <= 0:
         if speed < 0 or (speed == 0 and pull < 0):
             return 0.0
-        # the root at the start is left out
+        # the root at the start is excluded
         roots = np.roots([rise / 6, pull / 2, speed])
     else:
         roots = np.roots([rise / 6, pull / 2, speed, gap])

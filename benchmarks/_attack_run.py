@@ -11,7 +11,7 @@ from ._attack_events import Events
 from ._attack_systems import Problem, stated
 
 
-#: samples between events at which a run is compared, besides the ends of its steps
+# : samples between events at which a run is compared, in addition to the ends of steps
 SAMPLES = 60
 # a normal acceleration below this (in units of the problem) does not tell how deep
 _LEAST_PULL = 1e-3
@@ -21,19 +21,19 @@ class Run(NamedTuple):
     """A run of jaxcam in units of the problem."""
 
     events: Events
-    # of each impact: how far the gap would have fallen below zero, or the height of
-    # the hop that it leads to
+    # for each impact: how far the gap would have fallen below zero, or the height of
+    # the flight that follows
     depths: np.ndarray
     # states at the ends of steps and at samples
     times: np.ndarray
     states: np.ndarray
     end: float
-    # why it did not reach its end, or an empty string
+    # why the run did not reach its end, or an empty string
     result: str
 
 
 def simulated(problem: Problem, sampled: bool = True, **options) -> Run:
-    """Run jaxcam, and convert the result to units of the problem."""
+    """Run jaxcam and convert the result to the units of the problem."""
     system, state, t0, t1 = stated(problem)
     found = jaxcam.simulate(system, state, t0, t1, **options)
     d = problem.mass.size
@@ -74,5 +74,7 @@ def simulated(problem: Problem, sampled: bool = True, **options) -> Run:
 
 
 def depths(speeds, pulls) -> np.ndarray:
-    """The distance over which `pulls` stop the normal velocities `speeds`."""
+    """The distances over which the accelerations `pulls` stop the normal velocities
+    `speeds`.
+    """
     return speeds**2 / (2 * np.maximum(np.abs(pulls), _LEAST_PULL))

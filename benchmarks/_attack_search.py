@@ -1,4 +1,4 @@
-"""Find the first event within one step of an integrator, on a fine grid.
+"""Find the first event within one step of an integrator by searching a fine grid.
 
 A gap is assumed to have at most one extremum between two grid points. A minimum is
 found as a root of the normal velocity, so a dip below zero between two points is not
@@ -11,9 +11,9 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 
-#: a flight after a release is not judged up to this gap
+# : after a release, a gap is ignored until it exceeds this value
 CLEAR = 1e-9
-# parts of a step in which it is searched
+# number of intervals into which a step is divided for the search
 _PARTS = 24
 _ROOT = dict(xtol=1e-15, rtol=4 * np.finfo(float).eps, maxiter=300)
 
@@ -29,9 +29,9 @@ class Event(NamedTuple):
 def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None:
     """The first event in (begin, end], or `None`.
 
-    **Arguments:** `dense(times)`, states in columns; the gaps `held` in contact; the
-    gaps `fresh` that have left their surface at `begin` itself by an impact; the gaps
-    `blind` that opened by a release and are still near the surface.
+    **Arguments:** `dense(times)`, states in columns; `held`, the gaps in contact;
+    `fresh`, the gaps that rebounded from an impact exactly at `begin`; `blind`, the
+    gaps that opened by a release and are still near the surface.
     """
     times = np.linspace(begin, end, _PARTS + 1)
     states = dense(times)
@@ -39,7 +39,7 @@ def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None
     found = []
     for k in range(dynamics.m):
         if k not in held:
-            # the part of the step in which a gap after a release is not yet clear
+            # the part of the step in which a released gap is still near its surface
             clear = np.flatnonzero(gaps[:, k] > CLEAR) if k in blind else [0]
             if not len(clear):
                 continue
@@ -56,7 +56,7 @@ def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None
 
 
 def _closing(dynamics, dense, times, gaps, speeds, k, fresh):
-    """The first root of gap `k`, without the one at the start of a new flight."""
+    """The first root of gap `k`, excluding the one at the start of a new flight."""
 
     def gap(t):
         return dynamics.gaps(np.array([t]), dense(np.array([t])))[0][0, k]
@@ -70,7 +70,7 @@ def _closing(dynamics, dense, times, gaps, speeds, k, fresh):
         if gaps[i + 1] < 0:
             if not first:
                 return _root(gap, a, b)
-            # it rises first: the root lies behind the top
+            # the gap rises first: the root is beyond its maximum
             if speeds[i] <= 0 or speeds[i + 1] >= 0:
                 return a
             top = brentq(speed, a, b, **_ROOT)
@@ -107,9 +107,10 @@ def _letting_go(dynamics, dense, times, held, k):
 
 
 def _root(function, a, b):
-    """The downward zero of a function in [a, b]; an end, if rounding places it there.
+    """The downward zero crossing of a function in [a, b], or an end if rounding places
+    it there.
 
-    Evaluation of many points at once rounds differently, so the sign is checked again.
+    Evaluating many points at once rounds differently, so the sign is checked again.
     """
     if function(a) <= 0:
         return a
@@ -117,7 +118,9 @@ def _root(function, a, b):
 
 
 def _turns_low(values) -> bool:
-    """Whether a minimum is so near zero that it may be negative between the points."""
+    """Whether a minimum is so close to zero that it may be negative between grid
+    points.
+    """
     if len(values) < 3:
         return False
     before, middle, after = values[:-2], values[1:-1], values[2:]

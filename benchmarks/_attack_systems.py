@@ -1,8 +1,8 @@
-"""Generate random piecewise-smooth systems, and state them for jaxcam.
+"""Generate random piecewise-smooth systems, and formulate them for jaxcam.
 
-A problem is generated in its own units, in which lengths and times are near one. Its
-statement for jaxcam has a length unit of 1e-6 to 1e6 m, a time unit of 1e-3 to 1e3 s,
-and a start time of up to 1e4 s.
+A problem is generated in its own units, in which lengths and times are near one. For
+jaxcam it is converted to SI units with a length unit of 1e-6 to 1e6 m, a time unit of
+1e-3 to 1e3 s, and a start time of up to 1e4 s.
 """
 
 import dataclasses
@@ -14,15 +14,15 @@ import numpy as np
 import jaxcam
 
 
-#: coordinates and gaps of what is drawn: each pair is compiled once
+# : numbers of coordinates and gaps of the random systems; each pair is compiled once
 SHAPES = ((1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 3))
-#: how a motion begins
+# : kinds of initial state
 STARTS = ("free", "surface", "rest")
 
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """One system of d coordinates and m gaps with a start, in units of its own.
+    """A system with d coordinates and m gaps, and its initial state, in its own units.
 
     M q'' = -K q - k3 q^3 - (C + G) q' + w + A cos(omega t + phi)
             + P exp(-(t - s)^2 / (2 width^2)),
@@ -51,31 +51,31 @@ class Problem:
     softening: np.ndarray
     # positions, then velocities
     state: np.ndarray
-    # gaps that are closed at the start without normal velocity
+    # gaps that are closed at the start with zero normal velocity
     resting: tuple[int, ...]
     span: float
-    # units of length and time (m, s), and the start (s)
+    # units of length and time (m, s), and the start time (s)
     length: float
     time: float
     begin: float
 
     @property
     def kicked(self) -> bool:
-        """Whether there is a narrow force."""
+        """Whether there is a short force pulse."""
         return bool(np.any(self.kick))
 
     @property
     def conservative(self) -> bool:
-        """Whether only time-independent and dissipative forces act."""
+        """Whether all forces are time-independent or dissipative."""
         return not (self.kicked or np.any(self.drive) or np.any(self.wall))
 
     def in_plain_units(self) -> "Problem":
-        """The same problem with units of one, from time zero."""
+        """The same problem in unit scales, starting at time zero."""
         return dataclasses.replace(self, length=1.0, time=1.0, begin=0.0)
 
 
 def draw(seed: int) -> Problem:
-    """The problem of a seed; its shape is taken cyclically from `SHAPES`."""
+    """The problem for a seed; its shape is taken cyclically from `SHAPES`."""
     rng = np.random.default_rng([24, seed])
     d, m = SHAPES[seed % len(SHAPES)]
 
@@ -95,7 +95,8 @@ def draw(seed: int) -> Problem:
     if d == 1 and m == 2:
         normals[1] = -normals[0]
     offset = -rng.uniform(0.05, 1.0, size=m)
-    # a force towards the first wall: without a spring nothing else brings it back
+    # a force towards the first wall: without a spring nothing else brings the system
+    # back
     press = 0.9 if bound else 1.0
     weight = some(press, -normals[0] * rng.uniform(0.3, 2.0))
     weight = weight + some(0.3, 0.3 * rng.normal(size=d))
@@ -144,7 +145,7 @@ def _started(problem: Problem, rng) -> Problem:
         closed = () if kind == "free" else (0,)
         state = settled(problem, state, closed, 0.0)
         if kind == "surface":
-            # closed and moving out or in
+            # closed, and opening or closing
             state[d:] += rng.normal() * problem.normals[0] / problem.mass
         others = [k for k in range(m) if k not in closed]
         gaps = gaps_of(problem, 0.0, state)
@@ -152,7 +153,7 @@ def _started(problem: Problem, rng) -> Problem:
             resting = closed if kind == "rest" else ()
             return dataclasses.replace(problem, state=state, resting=resting)
         scale *= 0.93
-    # the origin without a start on a surface: walls may still be in its way
+    # the origin, not on a surface; it may still lie beyond a wall
     lift = np.max(-gaps_of(problem, 0.0, np.zeros(2 * d)))
     offset = problem.offset - max(lift + 0.05, 0.0)
     return dataclasses.replace(problem, offset=offset, state=np.zeros(2 * d))
@@ -181,7 +182,7 @@ def settled(problem: Problem, state, closed, t: float) -> np.ndarray:
 
 
 class Attacked(jaxcam.HybridSystem):
-    """`Problem` as a user would state it, in SI units."""
+    """`Problem` as a user would define it, in SI units."""
 
     mass: jax.Array
     stiffness: jax.Array
@@ -238,18 +239,21 @@ class Attacked(jaxcam.HybridSystem):
 
     @property
     def breakpoints(self):
-        # a narrow force is stated by where it begins, peaks and ends
+        # a short force pulse is declared by the times at which it begins, peaks and
+        # ends
         sides = jnp.asarray([-7.0, 0.0, 7.0])
         return self.kick_time + sides * self.kick_width
 
 
 def stated(problem: Problem) -> tuple[Attacked, np.ndarray, float, float]:
-    """The system, its start, and the times between which it is run, in SI units."""
+    """The system, its initial state, and the start and end times of the run, in SI
+    units.
+    """
     p, length, time = problem, problem.length, problem.time
     force = length / time**2
 
     def shifted(phase, frequency):
-        # longdouble: a late start multiplies the rounding of a phase
+        # longdouble: a late start time amplifies the rounding of the phase
         turn = np.longdouble(frequency) / time * np.longdouble(p.begin)
         return np.asarray(
             np.remainder(phase - turn, 2 * np.longdouble(np.pi)), np.float64

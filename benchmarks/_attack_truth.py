@@ -1,8 +1,8 @@
 """Simulate impacts, contacts and releases with an independent event loop on DOP853.
 
-It does not use jaxcam. Events are roots on the dense output of each step
-(`_attack_search`), impact laws are applied to the state there, contact is integrated
-with its contact forces, and sequences of impacts are followed hop by hop
+It does not use jaxcam. Events are roots of the dense output of each step
+(`_attack_search`), impact laws are applied to the state at the event, contact is
+integrated with its contact forces, and sequences of impacts are followed one by one
 (`_attack_rest`).
 """
 
@@ -18,7 +18,7 @@ from ._attack_systems import Problem, settled
 
 
 _MOST_EVENTS = 3000
-# an impact slower than this cannot be told from a graze
+# an impact slower than this cannot be distinguished from a graze
 _GRAZE = 1e-6
 
 
@@ -35,16 +35,16 @@ class Truth(NamedTuple):
     """A motion, up to the time at which it is known."""
 
     impacts: list[Impact]
-    # [start, end, constraint]; the end of one that lasts is infinite
+    # [start, end, constraint]; the end is infinite if contact lasts
     contacts: list[list]
     # (begin, end, dense output) of each piece
     pieces: list
     # (first, last) time of the sequences of impacts that end in contact, and their gaps
     sequences: list[tuple[float, float, frozenset]]
-    # up to where all this is known, and why not further
+    # time up to which all this is known, and why no further
     end: float
     reason: str
-    # numbers in a state
+    # number of components of a state
     size: int
 
     def at(self, times) -> np.ndarray:
@@ -76,14 +76,14 @@ def motion(problem: Problem, state, begin: float, end: float, tolerance=1e-12) -
 
 
 class _Loop:
-    """Mode by mode, event by event."""
+    """The event loop, which advances from event to event."""
 
     def __init__(self, problem, y, t, tolerance):
         self.dynamics = Dynamics(problem)
         self.problem, self.tolerance = problem, tolerance
         self.t, self.y, self.reason = t, y, ""
         self.held: tuple[int, ...] = ()
-        # gaps that have just left their surface, and those not yet clear of it
+        # gaps that have just left their surface, and those still near it
         self.fresh: set[int] = set()
         self.unarmed: set[int] = set()
         self.impacts, self.contacts, self.pieces = [], [], []
@@ -106,13 +106,13 @@ class _Loop:
                 self.fresh.add(k)
 
     def advance(self, end):
-        """To the next event, or the end."""
+        """Advance to the next event or to the end."""
         if len(self.impacts) > _MOST_EVENTS:
             self.reason = "too many impacts"
             return
         dynamics, held = self.dynamics, self.held
-        # a narrow force is not stepped over: the step ends where it begins and is
-        # short while it acts
+        # a short force pulse is not stepped over: a step ends where it begins, and
+        # steps are short while it acts
         p, limit, longest = self.problem, end, self.longest
         if p.kicked:
             first, last = (p.kick_time + s * 8 * p.kick_width for s in (-1, 1))
@@ -153,7 +153,7 @@ class _Loop:
         gaps, speeds = self.dynamics.closing(b, dense(b))
         self.unarmed = {k for k in self.unarmed if gaps[k] < CLEAR}
         if any(speeds[k] < 0 or gaps[k] < -CLEAR for k in self.unarmed):
-            self.t, self.reason = a, "contact again just after a release"
+            self.t, self.reason = a, "renewed contact just after a release"
         return not self.reason
 
     def _happen(self, event):
@@ -169,13 +169,14 @@ class _Loop:
                 self.reason = "two releases at once"
 
     def _impact(self, k):
-        """An impact, simultaneous ones, and the rest of a sequence."""
+        """Process an impact, simultaneous ones, and the rest of a sequence."""
         dynamics, t = self.dynamics, self.t
         gap, speeds = dynamics.closing(t, self.y)
         if speeds[k] > -_GRAZE:
             self.reason = "graze"
             return
-        # the event errs by the tolerance: the state is put on the surface
+        # the event has an error of the order of the tolerance: move the state onto the
+        # surface
         self.y[: dynamics.d] -= dynamics.across[:, k] * gap[k] / dynamics.coupling[k, k]
         held, queue = set(self.held), [k]
         for count in range(500):
@@ -196,7 +197,7 @@ class _Loop:
             held.discard(hit)
             self.fresh = touching - held
         else:
-            self.reason = "endless impacts in no time"
+            self.reason = "infinitely many impacts at one time"
             return
         if len(self.fresh) > 1 and count > 0:
             self.sequences.append((t, t, frozenset(self.fresh)))
@@ -226,11 +227,11 @@ class _Loop:
         self.sequences.append((begin, self.t, frozenset(rest.held)))
 
     def _settle(self, closed, already=()):
-        """Contact at closed gaps with zero normal velocity."""
+        """Decide which closed gaps with zero normal velocity stay in contact."""
         self.y = settled(self.problem, self.y, closed, self.t)
         held = self.dynamics.held_of(self.t, self.y, closed)
         if held is None:
-            self.reason = "contact that neither presses nor lets go"
+            self.reason = "contact with neither compression nor release"
             return
         self.held, self.fresh = held, set()
         self.unarmed |= set(closed) - set(held)

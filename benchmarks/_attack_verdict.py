@@ -1,11 +1,12 @@
 """Decide whether jaxcam's run of a problem agrees with the reference motion.
 
-The reference motion is computed three times: as stated, and twice with initial state
-and time shifted by about 1e-8. The differences between them give the permitted error of
-a run. The comparison ends where their events differ: grazing, or growth beyond 1e-5, is
-not an error. Damping may reduce the shift before it grows again, but an error made in
-between grows in full. It is assumed to be 1e-8, about a hundred steps of the default
-tolerance, times the growth since the smallest distance so far.
+The reference motion is computed three times: once unchanged, and twice with the initial
+state and time shifted by about 1e-8. The differences between the three give the
+permitted error of a run. The comparison ends where their events differ: grazing, or
+growth beyond 1e-5, is not an error. Damping may reduce the shift before it grows again,
+but an error made in between grows in full. That error is assumed to be 1e-8 (about a
+hundred steps at the default tolerance) times the growth since the smallest difference
+so far.
 """
 
 import dataclasses
@@ -21,19 +22,19 @@ from ._attack_systems import gaps_of, Problem, settled
 from ._attack_truth import motion, Truth
 
 
-# by what the start is moved, in units of the problem, and the error made on the way
+# shift of the start, in units of the problem, and error made during the run
 _MOVED, _ON_THE_WAY = 1e-8, 1e-8
-# distance of two runs that says nothing
+# difference of two runs that is meaningless
 _ROUNDING = 1e-12
-# error that is let pass everywhere, and how much larger than the effect of the move
+# error that is always permitted, and permitted ratio to the effect of the shift
 _FLOOR, _MARGIN = 1e-7, 10.0
-# growth of the move beyond which nothing is compared
+# growth of the shift beyond which nothing is compared
 _LOST = 1e-5
-# a state this close in time to an impact is not compared
+# states this close in time to an impact are not compared
 _NEAR = 1e-3
-# gap and rise of the energy that are let pass, relative to the size of the motion
+# permitted penetration and energy increase, relative to the size of the motion
 _THROUGH, _RISE = 1e-9, 1e-8
-# the one result that docs/limits.md has for a system that is in order
+# the one failure that docs/limits.md permits for a valid system
 _DOCUMENTED = RESULTS[RESULTS.together]
 # impacts on each of two gaps within `_NEAR` of the end of such a run: so many times, as
 # those of a chatter that is completed on the way are not listed, or so many in no time
@@ -43,11 +44,12 @@ _TIMES, _HITS = 3, 20
 class Verdict(NamedTuple):
     """The result of one problem."""
 
-    # in order: "agrees", "grazes", and "refuses" as docs/limits.md says; not in order:
-    # "DISAGREES" and "MISBLAMES"
+    # acceptable: "agrees", "grazes", and "refuses" as documented in docs/limits.md; not
+    # acceptable: "DISAGREES" and "MISBLAMES"
     label: str
     what: str
-    # fraction of the span that was compared, and the largest error over that allowed
+    # fraction of the span that was compared, and largest ratio of error to permitted
+    # error
     compared: float
     worst: float
 
@@ -57,7 +59,7 @@ class Known(NamedTuple):
 
     truth: Truth
     end: float
-    # times, and by how much a run may be wrong from there on
+    # times, and the permitted error of a run from each time on
     times: np.ndarray
     allowed: np.ndarray
 
@@ -67,7 +69,7 @@ class Known(NamedTuple):
 
 
 def know(problem: Problem) -> Known:
-    """The reference motion, and the time up to which it is known."""
+    """Compute the reference motion, and the time up to which it is known."""
     truth = motion(problem, problem.state, 0.0, problem.span)
     if not truth.pieces:
         return Known(truth, 0.0, np.zeros(1), np.array([_FLOOR]))
@@ -111,7 +113,7 @@ def judge(problem: Problem, known: Known, **options) -> Verdict:
     try:
         run = simulated(problem, **options)
     except ValueError as error:
-        # what was drawn is in order, and so is its start
+        # the random system and its initial state are valid
         return Verdict("MISBLAMES", f"at the start: {error}", 0.0, 0.0)
     except Exception as error:
         said = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -126,7 +128,7 @@ def judge(problem: Problem, known: Known, **options) -> Verdict:
         said = f"t = {mismatch.time:.9g}: {mismatch.what}"
         return Verdict("DISAGREES", said, mismatch.time / problem.span, np.inf)
     if mismatch:
-        # behind an impact that may be or not be there is nothing to compare
+        # beyond an impact that may or may not occur there is nothing to compare
         limit = end = min(end, max(mismatch.time, 0.0))
         label = "grazes"
     compared = end / problem.span
@@ -177,13 +179,15 @@ def _rows(one: Events, other: Events, kind: str) -> np.ndarray:
 
 
 def _distance(one, other) -> np.ndarray:
-    """Largest difference of each state, relative to a size of one or more."""
+    """Largest difference of each state, relative to its magnitude or to one, if that is
+    larger.
+    """
     size = 1 + np.max(np.abs(one), axis=1, initial=0.0)
     return np.max(np.abs(one - other), axis=1, initial=0.0) / size
 
 
 def _clear(times, truth: Truth, run: Run | None = None) -> np.ndarray:
-    """The times that are not at an impact nor within a sequence of impacts."""
+    """The times that are neither at an impact nor within a sequence of impacts."""
     keep = np.ones(len(times), bool)
     spans = [(i.time, i.time) for i in truth.impacts]
     spans += [(a, b) for a, b, _ in truth.sequences]
@@ -194,7 +198,7 @@ def _clear(times, truth: Truth, run: Run | None = None) -> np.ndarray:
 
 
 def _differ(known: Known, run: Run, end: float) -> Mismatch | None:
-    """The first event that is not shared."""
+    """The first event that the two runs do not share."""
     true = _events(known.truth)
     found = []
     for kind in ("impacts", "contacts"):
@@ -211,7 +215,7 @@ def _differ(known: Known, run: Run, end: float) -> Mismatch | None:
 
 
 def _grazes(known: Known, run: Run, mismatch: Mismatch) -> bool:
-    """Whether an impact that only one run has is grazing within the tolerance."""
+    """Whether an impact found in only one run is a graze to within the tolerance."""
     room = known.room(min(mismatch.time, known.end))
     hits = [i for i in known.truth.impacts if abs(i.time - mismatch.time) <= 1e-6]
     speeds, pulls = ([i[k] for i in hits] for k in (2, 3))
@@ -223,7 +227,7 @@ def _grazes(known: Known, run: Run, mismatch: Mismatch) -> bool:
 
 
 def _accumulates(run: Run) -> bool:
-    """Whether impacts on at least two gaps accumulate before the end of a run.
+    """Whether impacts at two or more gaps accumulate before the end of a run.
 
     A few simultaneous impacts, as in a corner, are not an accumulation.
     """
@@ -236,8 +240,8 @@ def _accumulates(run: Run) -> bool:
 
 
 def _invariant(problem: Problem, run: Run) -> str:
-    """A violated condition that holds for every motion; an empty string if none is
-    violated.
+    """A condition that every motion must satisfy but this one violates, or an empty
+    string.
     """
     if not np.all(np.isfinite(run.states)):
         return "a state is not finite"
@@ -246,7 +250,7 @@ def _invariant(problem: Problem, run: Run) -> str:
     gaps = np.array(
         [gaps_of(problem, t, y) for t, y in zip(run.times, run.states, strict=True)]
     )
-    # a late time is rounded, and with it the place of a wall
+    # a late time is rounded, and so is the position of a wall
     late = 4e-16 * abs(problem.begin) / problem.time
     through = (
         np.min(gaps)
@@ -280,7 +284,7 @@ def _situation(known: Known, run: Run) -> str:
     for first, last, which in truth.sequences:
         if first - near <= t <= last + near:
             together = "several gaps together" if len(which) > 1 else "one gap"
-            return f"end of a chatter, {together}"
+            return f"end of chatter, {together}"
     if any(abs(end - t) <= near for _, end, _ in truth.contacts):
         return "release"
     if any(abs(i.time - t) <= near for i in truth.impacts):
@@ -289,5 +293,5 @@ def _situation(known: Known, run: Run) -> str:
 
 
 def plain(problem: Problem, **changes) -> Problem:
-    """The same problem in units of one, from time zero."""
+    """The same problem in unit scales, starting at time zero."""
     return dataclasses.replace(problem.in_plain_units(), **changes)

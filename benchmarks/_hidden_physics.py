@@ -1,9 +1,9 @@
 """Unnamed physics for the rigs of `_own_rig_makers.py`.
 
-Each effect is stated relative to the motion of the rig without it: `u` is the first
-coordinate, from -1 to 1 over its range, `w` its velocity in units of its largest one,
-`phi` the drive's angle, `t` the share of the record that has passed, and `s` the
-approach speed in units of the largest one.
+Each effect is scaled to the motion of the rig without it: `u` is the first coordinate,
+from -1 to 1 over its range, `w` its velocity divided by its largest value, `phi` the
+drive angle, `t` the elapsed fraction of the record, and `s` the approach speed divided
+by its largest value.
 """
 
 from collections.abc import Callable
@@ -15,14 +15,14 @@ import numpy as np
 class Effect(NamedTuple):
     """An effect that a textbook model lacks.
 
-    - `kind` and `arguments`, as a verdict states them.
+    - `kind` and `arguments`, as in a verdict.
     - `value(u, w, phi, t, s)`: for a force, in units of the rig's own acceleration; for
-      a restitution, the logarithm of its factor; for a surface or a sensor, in units of
-      the sensor's noise.
-    - `size`: least and largest factor on `value`.
-    - `memory`: rates of change of the effect's own `states`, `(own, u, rate, hertz)`
-      with `rate` that of `u` and the `hertz` of the drive. Such an effect's `value` has
-      the first of them in the place of `s`.
+        a coefficient of restitution, the logarithm of its factor; for a surface or a
+        sensor, in units of the sensor noise.
+    - `size`: smallest and largest factor applied to `value`.
+    - `memory`: rates of change of the effect's own `states` as a function of `(own, u,
+        rate, hertz)`, with the `rate` of change of `u` and the drive frequency `hertz`.
+        The `value` of such an effect takes the first of its states in place of `s`.
     """
 
     kind: str
@@ -38,18 +38,18 @@ def _within(x, low, high):
 
 
 def _spring_and_damper(own, u, rate, hertz):
-    """A damper in series with a spring: the force on it, relaxing."""
+    """A damper in series with a spring, whose force relaxes."""
     return (rate - own[0] * 1.5 * hertz,)
 
 
 def _hysteresis(own, u, rate, hertz):
-    """The law of Bouc and Wen; it yields within a quarter of the range."""
+    """A Bouc-Wen law that yields within a quarter of the range."""
     z = own[0]
     return (4 * rate - 2 * (abs(rate) * z * abs(z) + rate * z * z),)
 
 
 def _resonance(own, u, rate, hertz):
-    """A lightly damped oscillator with 3.7 times that frequency, driven by the
+    """A lightly damped oscillator at 3.7 times the drive frequency, driven by the
     deflection.
     """
     w = 2 * np.pi * 3.7 * hertz
@@ -67,7 +67,7 @@ _AT_PLACE, _AT_SPEED, _ON_THE_WAY = (
 )
 
 EFFECTS = {
-    # forces by position
+    # forces as a function of position
     "stop": _force(
         _AT_PLACE, lambda u, w, phi, t, s: -np.maximum(u - 0.6, 0), 0.2, 0.6
     ),
@@ -83,7 +83,7 @@ EFFECTS = {
     "detents": _force(
         _AT_PLACE, lambda u, w, phi, t, s: np.sin(2 * np.pi * 1.8 * u), 0.03, 0.1
     ),
-    # by velocity
+    # of velocity
     "fast_drag": _force(
         _AT_SPEED,
         lambda u, w, phi, t, s: -np.sign(w) * np.maximum(np.abs(w) - 0.4, 0),
@@ -96,7 +96,7 @@ EFFECTS = {
         0.02,
         0.06,
     ),
-    # by both
+    # of position and velocity
     "zone_friction": _force(
         _ON_THE_WAY,
         lambda u, w, phi, t, s: -np.sign(w) * _within(u, -0.1, 0.5),
@@ -109,7 +109,7 @@ EFFECTS = {
         0.05,
         0.2,
     ),
-    # by the drive
+    # of the drive angle
     "pulse": _force(
         ("phase",), lambda u, w, phi, t, s: 1.0 * (np.cos(phi - 2.0) > 0.6), 0.02, 0.06
     ),
@@ -119,11 +119,11 @@ EFFECTS = {
         0.03,
         0.1,
     ),
-    # by time
+    # of time
     "ramp": _force(("time",), lambda u, w, phi, t, s: t, 0.02, 0.06),
     "jolt": _force(("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.55), 0.02, 0.06),
     "warming": _force(("time", "velocity"), lambda u, w, phi, t, s: w * t, 0.02, 0.06),
-    # with a memory
+    # with memory
     "relaxing": _force(
         ("memory",),
         lambda u, w, phi, t, own: -own,
@@ -164,11 +164,11 @@ EFFECTS = {
         lambda u, w, phi, t, s: -np.cos(phi - 1.0),
         (0.04, 0.12),
     ),
-    # of the surface
+    # at the surface
     "thermal": Effect(
         "surface", ("time",), lambda u, w, phi, t, s: 1 - np.exp(-3 * t), (8.0, 25.0)
     ),
-    # of the sensor
+    # in the sensor
     "off_centre": Effect(
         "sensor",
         ("position",),
@@ -185,7 +185,7 @@ EFFECTS = {
 
 
 class Scales(NamedTuple):
-    """The motion of a rig without an effect, which defines the units of effects."""
+    """The scales of effects, from the motion of a rig without an effect."""
 
     middle: float
     reach: float
@@ -197,15 +197,15 @@ class Scales(NamedTuple):
 
 
 class Hidden(NamedTuple):
-    """An effect of some size in a rig, in the rig's own units."""
+    """An effect of given size, in the units of the rig."""
 
     effect: Effect
     size: float
     scales: Scales
 
     def at(self, x, v, phi, t, s=0.0):
-        """The value that a verdict should state, without the part that the rig
-        parameters can represent.
+        """The value of the effect, including any part that the rig parameters can
+        represent.
         """
         scales, effect = self.scales, self.effect
         unit = {"force": scales.acceleration, "resonance": scales.acceleration}

@@ -1,4 +1,4 @@
-"""Which lines of some modules run, while pytest runs with the arguments given.
+"""Record which lines of some modules run while pytest runs with the given arguments.
 
 python -m benchmarks._mutation_lines lines.json FILE... -- PYTEST_ARGUMENT...
 """

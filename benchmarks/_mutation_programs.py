@@ -1,7 +1,6 @@
-"""Compute a hash of the programs that jaxcam generates for some systems, without
-compiling them.
+"""Hash the programs that jaxcam generates for some systems, without compiling them.
 
-A change of the source that changes no program changes nothing for these systems.
+A source change that changes no program has no effect on these systems.
 """
 
 import hashlib
@@ -56,7 +55,7 @@ def digest() -> str:
             made = jax.make_jaxpr(lambda *a, way=way: run(*a, way))(
                 numbers, jnp.zeros(n), jnp.asarray(1.0)
             )
-            # functions of Python are printed with where they lie
+            # Python functions are printed with their addresses
             found.update(re.sub("0x[0-9a-f]+", "", str(made.jaxpr)).encode())
             for constant in made.consts:
                 found.update(jnp.asarray(constant).tobytes())

@@ -4,11 +4,12 @@
   comparison use one method. The free follower is q'' = f(q), so stage velocities drop
   out (squared tableau, algebraically the same step) and neighbouring stages become
   independent, which hides latency.
-* Every step is aimed at the landing that gap, velocity, acceleration, jerk and snap
-  predict, and the step is retaken only if it ends further than `reach` from the
-  contact. The rest, and every flight shorter than `reach`, is done by Taylor's series.
-  `reach=STEPS_ONLY` leaves all but rounding to the order-8 step.
-* sin and cos by polynomials; the cam's Fourier series as a table of short polynomials.
+* Every step is aimed at the landing predicted from gap, velocity, acceleration, jerk
+    and snap, and is retaken only if it ends further than `reach` from the contact. The
+    remainder, and every flight shorter than `reach`, is computed from a Taylor series.
+    `reach=STEPS_ONLY` leaves everything but rounding to the order-8 step.
+* sin and cos are polynomials; the Fourier series of the cam is a table of short
+    polynomials.
 """
 
 import math
@@ -39,12 +40,14 @@ _STIFF = STIFFNESS / INERTIA
 
 
 def _fit(function, high, degree):
-    """Power coefficients, lowest first, of a Chebyshev interpolant on [0, high]."""
+    """Power-series coefficients, lowest first, of a Chebyshev interpolant on [0,
+    high].
+    """
     fit = np.polynomial.Chebyshev.interpolate(function, degree, domain=[0, high])
     return tuple(fit.convert(kind=np.polynomial.Polynomial).coef.tolist())
 
 
-# In z = angle^2, good to 3e-16 for |angle| < 1.6; the spring ends at pi / 2.
+# In z = angle^2, accurate to 3e-16 for |angle| < 1.6; the spring ends at pi / 2.
 _SIN = _fit(lambda z: np.sinc(np.sqrt(z) / np.pi), 2.56, 7)
 _COS = _fit(lambda z: np.cos(np.sqrt(z)), 2.56, 8)
 
@@ -66,7 +69,7 @@ _CAM = _cam_table()
 
 
 def _estrin(names, z):
-    """Text of a polynomial, summed in pairs: a short chain of operations."""
+    """Source of a polynomial summed in pairs, for a short chain of operations."""
     power = z
     while len(names) > 1:
         even, odd = names[::2], names[1::2]
@@ -95,14 +98,14 @@ _sincos = _compile("_sincos", _sincos_source(), "always")
 
 @njit(inline="always", **_OPTIONS)
 def _spring(q, scale):
-    """Angular acceleration (4.9) times `scale`, with one division."""
+    """Angular acceleration (thesis, eq. (4.9)) times `scale`, with one division."""
     s, c = _sincos(q)
     pull = (SPRING_X * s + HALF_HEIGHT) - SPRING_REACH * c
     return pull * ((-_STIFF * scale) * (SPRING_X + HALF_HEIGHT * s)) / (c * c * c)
 
 
 def _step_source():
-    """One step of q'' = f(q): state at the end and the two error terms."""
+    """Source of one step of q'' = f(q): state at the end and the two error terms."""
     tableau = Dopri8().tableau
     stages = 13
     a = np.zeros((stages, stages))
@@ -133,7 +136,9 @@ _step = _compile("_step", _step_source(), "never")
 
 @njit(inline="always", **_OPTIONS)
 def _slopes(q):
-    """Angular acceleration (4.9) and its first two derivatives by the angle."""
+    """Angular acceleration (thesis, eq. (4.9)) and its first two derivatives with
+    respect to angle.
+    """
     s, c = _sincos(q)
     i = 1 / c
     ii = i * i
@@ -150,7 +155,7 @@ def _slopes(q):
 
 @njit(inline="always", **_OPTIONS)
 def _surface(table, speed, t):
-    """Contact angle at time t and its first four derivatives by time."""
+    """Contact angle at time t and its first four time derivatives."""
     x = (-speed / _ARC) * t
     low = math.floor(x)
     x = (x - low - 0.5) * _ARC
@@ -169,7 +174,9 @@ def _surface(table, speed, t):
 
 @njit(inline="always", **_OPTIONS)
 def _landing(g, v, a, j, s):
-    """First later zero of the gap's Taylor polynomial from a point above the cam."""
+    """First later zero of the Taylor polynomial of the gap, from a point above the
+    cam.
+    """
     if g == 0.0:
         d = 0.25 * a * a - (2 / 3) * j * v
         d = 2 * v / (math.sqrt(d) - 0.5 * a) if d > 0 else -1.0
@@ -187,7 +194,7 @@ def _landing(g, v, a, j, s):
 
 @njit(inline="always", **_OPTIONS)
 def _dip(x, h, g, v, a, g1, v1, a1):
-    """Gap at x in [0, 1] of a step from the quintic through both of its ends."""
+    """Gap at x in [0, 1] of a step, from the quintic through both of its ends."""
     v, v1, a, a1 = h * v, h * v1, h * h * a / 2, h * h * a1 / 2
     p = g1 - g - v - a
     q = v1 - v - 2 * a
@@ -198,7 +205,9 @@ def _dip(x, h, g, v, a, g1, v1, a1):
 
 @njit(**_OPTIONS)
 def _lane(table, speed, r, q, w, release, reach, tolerance, samples):
-    """Integrate one lane, fill samples (turns, 2), return impacts and steps."""
+    """Integrate one trajectory, fill samples (turns, 2), return numbers of impacts and
+    steps.
+    """
     turns = samples.shape[0]
     period = 2 * math.pi / speed
     limit = period / 3
@@ -209,7 +218,7 @@ def _lane(table, speed, r, q, w, release, reach, tolerance, samples):
     c, c1, c2, c3, c4 = _surface(table, speed, t)
     g = q - c
     while True:
-        # (t, q, w) is a point of a flight, f.. and c.. belong to it.
+        # (t, q, w) is a point of a flight; f.. and c.. are evaluated there.
         k1 = f1 * w
         k2 = f2 * w * w + f1 * f
         v, a = w - c1, f - c2
@@ -238,7 +247,7 @@ def _lane(table, speed, r, q, w, release, reach, tolerance, samples):
             g1, v1, a1 = q1 - c, w1 - c1, e - c2
             d = v1 * v1 - 2 * a1 * g1
             if v1 < 0 and d > 0:
-                # Time to the contact from the end of the step, mostly a small one.
+                # Time to contact from the end of the step, usually short.
                 d = -2 * g1 / (v1 - math.sqrt(d))
                 hit = abs(d) <= reach and (sampled or t1 + d < strobe)
             else:
@@ -268,7 +277,7 @@ def _lane(table, speed, r, q, w, release, reach, tolerance, samples):
         t, q, w, f, f1, f2, g = t1, q1, w1, e, e1, e2, g1
         if not hit:
             continue
-        # Move to the contact by Taylor's series; d takes in jerk and snap.
+        # Move to the contact with a Taylor series; d includes jerk and snap.
         impacts += 1
         k1 = f1 * w
         k2 = f2 * w * w + f1 * f
@@ -321,7 +330,7 @@ def _lanes(table, speed, r, start, release, reach, tolerance, samples, impacts, 
 
 
 def simulate(workload: Workload, tolerance: float = 1e-9, reach: float = TAYLOR):
-    """Run every lane of a workload.
+    """Run every trajectory of a workload.
 
     Returns samples (lanes, turns, 2) at t = period, 2 period, ..., impacts (lanes,)
     and steps (lanes,).

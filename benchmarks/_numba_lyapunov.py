@@ -1,9 +1,8 @@
-"""Lyapunov exponents of the forced oscillator in numba, one batch element after the
-other.
+"""Lyapunov exponents of the forced oscillator in numba, one batch element at a time.
 
-Dormand and Prince's pair of order 5 with step control on the state and its two
-deviations together, impacts by Newton's method on the length of the step, saltation
-matrix and Gram-Schmidt at every impact.
+The Dormand-Prince 5(4) pair with step control on the state and its two deviations
+together, impacts by Newton's method on the step length, and the saltation matrix and
+Gram-Schmidt at every impact.
 """
 
 import math
@@ -115,7 +114,7 @@ def _lane(omega, r, wall, damping, x, v, end, tolerance, logs):
             h *= factor
             continue
         if after[0] > wall:
-            # Newton on the length of the step, from the chord
+            # Newton's method on the step length, starting from the secant
             s = h * (wall - y[0]) / (after[0] - y[0])
             s = min(max(s, 0.0), h)
             for _ in range(20):

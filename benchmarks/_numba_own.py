@@ -1,8 +1,8 @@
 """A scalar loop for the pendulum of `own_system.py`, compiled with numba.
 
-Steps of `diffrax.Dopri8`, unrolled, with the functions as a reader would write them;
-Newton's iteration on the length of the step at an impact; chatter summed to second
-order; the release from the fixed wall in closed form.
+Steps of `diffrax.Dopri8`, unrolled, with the functions as a user would write them;
+Newton's method on the step length at an impact; chatter completed to second order;
+release from the fixed wall in closed form.
 """
 
 import math
@@ -22,7 +22,7 @@ def _force(t, q, w, damping, amplitude, frequency):
 
 
 def _step_text() -> str:
-    """One step, every stage written out."""
+    """Source of one step, with every stage written out."""
     lower, c = _TABLEAU.a_lower, _TABLEAU.c
     lines = [
         "def step(t, q, w, h, d, a, f):",
@@ -93,7 +93,8 @@ def _lane(q, w, wall, r, d, a, f, tolerance, samples):
             stuck = (
                 t - 2 * w / (k * (1 - r)) - 4 / 3 * jerk * w**2 / k**3 / (1 - r) ** 2
             )
-            # it lets go where the force on a pendulum at rest there turns outward
+            # it is released where the force on a pendulum at rest on the wall turns
+            # outward
             phase = 2 * math.pi - math.acos(math.sin(wall) / a)
             let_go = phase / f + period * math.ceil((t - phase / f) / period)
             if stuck < let_go:
@@ -112,7 +113,7 @@ def _lanes(start, wall, r, d, a, f, tolerance, samples, impacts):
 
 
 def simulate(start, turns: int, numbers, tolerance: float = 1e-9):
-    """Samples `(lanes, turns, 2)` once a period, and impacts `(lanes,)`.
+    """Return samples `(lanes, turns, 2)` once per period, and impacts `(lanes,)`.
 
     **Arguments:** `numbers` are wall, restitution, damping, amplitude, frequency.
     """

@@ -1,7 +1,7 @@
-"""Simulate a cam-follower rig with all effects that a model may lack, in numba.
+"""Simulate a cam-follower rig with effects that a model may lack, in numba.
 
 It shares no code with `jaxcam.hybrid`: Runge-Kutta steps between samples, impacts by
-bisection, contact as the surface itself until the free acceleration lifts off.
+bisection, contact follows the surface until the free acceleration lifts off.
 """
 
 import dataclasses
@@ -13,7 +13,7 @@ import numpy as np
 from jaxcam.data.make_demo import RealRig
 
 
-# A gap that opens from zero is not yet closed again by rounding errors (rad)
+# A gap that opens from zero is not considered closed again below this value (rad)
 _ROUNDING = 1e-13
 
 
@@ -21,9 +21,10 @@ _ROUNDING = 1e-13
 class Hidden:
     """Effects in addition to the textbook physics; units as in `jaxcam.discrepancy`.
 
-    The last ones are in no list of names: `imbalance` (rad/s^2) the weight of the arm,
-    `fading` (1/s) a restitution that falls with time, `step` (rad/s^2) a force in half
-    of each turn, `one_way` (rad/s^2) friction on the way up only.
+    The last ones are not in the list of named effects: `imbalance` (rad/s^2), the
+    weight of the arm; `fading` (1/s), a coefficient of restitution that falls with
+    time; `step` (rad/s^2), a force during half of each turn; `one_way` (rad/s^2),
+    friction during upward motion only.
     """
 
     c1: float = 0.0
@@ -45,7 +46,7 @@ class Hidden:
 
 @dataclasses.dataclass(frozen=True)
 class Samples:
-    """True samples: time (s), angle that the cam has turned, follower's angle (rad)."""
+    """True samples: time (s), cam rotation and follower angle (rad)."""
 
     time: np.ndarray
     turned: np.ndarray
@@ -163,7 +164,7 @@ def _run(harmonics, n, speed, interval, count, first):
     x += 0.01
     resting, longest = False, interval
     for sample in range(count):
-        # a late sensor shows what was before
+        # a delayed sensor shows an earlier value
         target = sample * interval - lag
         while t < target:
             h = min(target - t, longest)

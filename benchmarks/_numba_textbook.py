@@ -1,8 +1,8 @@
 """A0: the usual scalar loop of textbooks, compiled with numba.
 
-Adaptive Dormand-Prince 5(4), first same as last, Newton's iteration on the length of
-the step at an impact, and the cam and the spring as printed, (4.9) and (4.23), with
-sin, cos, asin and atan2 of the mathematics library.
+Adaptive Dormand-Prince 5(4) (first same as last), Newton's method on the step length at
+an impact, and the spring and the cam as printed (thesis, eqs. (4.9) and (4.23)), with
+sin, cos, asin and atan2 from the math library.
 """
 
 import math
@@ -32,7 +32,7 @@ STIFF = STIFFNESS / INERTIA
 
 @njit(inline="always")
 def _spring(q):
-    """Angular acceleration (4.9)."""
+    """Angular acceleration (thesis, eq. (4.9))."""
     s, c = math.sin(q), math.cos(q)
     stretch = SPRING_X * s / c + HALF_HEIGHT / c - SPRING_REACH
     return -STIFF * stretch * (SPRING_X + HALF_HEIGHT * s) / (c * c)
@@ -50,15 +50,15 @@ def _spring_slope(q):
 
 @njit(inline="always")
 def _contact(theta):
-    """Contact angle (4.23)."""
+    """Contact angle (thesis, eq. (4.23))."""
     x, y = ECC * math.cos(theta) + X0, ECC * math.sin(theta) + Y0
     return math.asin(REACH / math.sqrt(x * x + y * y)) + math.atan2(y, x)
 
 
 @njit(inline="always")
 def _contact_derivatives(theta):
-    """First three derivatives of (4.23) with respect to the cam angle, through p = x^2
-    + y^2.
+    """First three derivatives of the contact angle with respect to the cam angle,
+    through p = x^2 + y^2.
     """
     s, c = math.sin(theta), math.cos(theta)
     p = X0 * X0 + Y0 * Y0 + ECC * ECC + 2 * ECC * (X0 * c + Y0 * s)
@@ -106,10 +106,12 @@ def _step(q, w, k1, h):
 
 @njit(cache=True, error_model="numpy")
 def _lane(speed, r, q, w, release, tolerance, samples):
-    """Integrate one lane, fill samples (turns, 2), return impacts and steps."""
+    """Integrate one trajectory, fill samples (turns, 2), return numbers of impacts and
+    steps.
+    """
     turns = samples.shape[0]
     period = 2 * math.pi / speed
-    # Longer steps jump over contacts: the cam may touch and leave within one.
+    # Longer steps jump over contacts: the cam may touch and leave within one step.
     longest = period / 40
     t, h = 0.0, longest
     k = _spring(q)
@@ -135,7 +137,7 @@ def _lane(speed, r, q, w, release, tolerance, samples):
                 samples[done, 0], samples[done, 1] = q, w
                 done += 1
             continue
-        # The gap closed inside the step: Newton on its length.
+        # The gap closed within the step: Newton's method on its length.
         for _ in range(20):
             c1, _, _ = _contact_derivatives(-speed * (t + step))
             step = min(max(step - gap / (w1 + speed * c1), 0.0), 2 * step)
@@ -182,7 +184,7 @@ def _lanes(speed, r, start, release, tolerance, samples, impacts, steps):
 
 
 def simulate(workload: Workload, tolerance: float = 1e-9):
-    """Run every lane of a workload.
+    """Run every trajectory of a workload.
 
     Returns samples (lanes, turns, 2) at t = period, 2 period, ..., impacts (lanes,)
     and steps (lanes,).

@@ -1,7 +1,7 @@
-"""Simulate recordings of the rigs in `docs/rigs`, without code of the package.
+"""Simulate recordings of the rigs in `docs/rigs`, without any code from the package.
 
-Each rig is defined again as plain functions of numbers, and integrated by scipy's
-DOP853 from impact to impact.
+Each rig is defined again as plain functions of numbers, and integrated from impact to
+impact with scipy's DOP853.
 """
 
 import math
@@ -18,19 +18,19 @@ from jaxcam.recordings import Recording
 INTERVAL, SETTLE = 5e-4, 8.0
 _COUNT = 2 * math.pi / 20000  # of the encoder on the drive
 _DRIVE_NOISE = 1e-4
-# A rig whose impacts come closer together than this (s) is drawn again
+# A rig whose impacts are closer together than this (s) is redrawn
 _CHATTER = 2e-3
 
 
 class Maker(NamedTuple):
     """The motion of a rig.
 
-    - `field(p, x, phi, w, u)`: rate of change of the state, of the drive's angle and
-        rate, or an input.
-    - `gaps(p, x)`, and `impacts`, one law `(p, x)` for each of them.
-    - `start`: of the state; `speeds` (rad/s): least and largest, of a driven rig.
-    - `channels`: name of each and the component of the state it shows.
-    - `restitution`: the parameter of the first gap's law.
+    - `field(p, x, phi, w, u)`: rate of change of the state, given the drive's angle and
+        rate or an input.
+    - `gaps(p, x)`, and `impacts`, one impact law `(p, x)` for each gap.
+    - `start`: initial state; `speeds` (rad/s): smallest and largest, for a driven rig.
+    - `channels`: name of each channel, and the state component that it measures.
+    - `restitution`: the parameter of the impact law of the first gap.
     """
 
     field: Callable
@@ -118,9 +118,10 @@ MAKERS = {
 
 
 class Motion(NamedTuple):
-    """What a record was made of: `states` `(n, d)` and the drive's `angle` `(n,)` at
+    """The motion behind a record: `states` `(n, d)` and the drive's `angle` `(n,)` at
     `time` `(n,)`, the `hertz` of the drive, and a row `(time, approach speed, angle)`
-    for each impact on the first constraint."""
+    for each impact on the first constraint.
+    """
 
     time: np.ndarray
     states: np.ndarray
@@ -132,9 +133,9 @@ class Motion(NamedTuple):
 def record_case(
     name: str, setup, truth: dict[str, float], rng, *, duration=6.0, records=4
 ) -> list[Recording]:
-    """Recordings of one rig at several speeds, or with several inputs.
+    """Make recordings of one rig at several speeds, or with several inputs.
 
-    **Raises:** `Accumulates` for a rig that comes to rest on a constraint.
+    **Raises:** `Accumulates` if the rig comes to rest on a constraint.
     """
     return [
         run for run, _ in made_case(name, setup, truth, rng, None, duration, records)
@@ -151,9 +152,10 @@ def made_case(
     records: int = 4,
     speeds: tuple[float, float] | None = None,
 ) -> list[tuple[Recording, Motion]]:
-    """Recordings with a hidden effect, and the underlying motions.
+    """Make recordings with a hidden effect, and return them with the underlying
+    motions.
 
-    `speeds`: least and largest, in the place of the rig's own.
+    `speeds`: smallest and largest, instead of those of the rig.
     """
     maker, found = MAKERS[name], []
     for k in range(records):
@@ -177,7 +179,7 @@ def _driven(maker, setup, truth, rng, duration, speed, hidden):
     shift = rng.uniform(0, 2 * math.pi, 3)
 
     def drive(t):
-        """Angle and rate of a drive that wanders by 0.02 %."""
+        """Angle and rate of a drive whose speed wanders by 0.02 %."""
         angle, rate = speed * t + shift[0], speed
         for share, hertz, lead in ((0.7, 0.29, shift[1]), (0.3, 0.83, shift[2])):
             v = 2 * math.pi * hertz
@@ -229,7 +231,8 @@ def _measured(maker, setup, motion, rng, hidden) -> dict[str, np.ndarray]:
 class _Flight:
     """A rig with its hidden effect, integrated from impact to impact.
 
-    `begin` is when the record begins. The states of an effect come after the rig's own.
+    `begin` is the time at which the record begins. The states of an effect follow those
+    of the rig.
     """
 
     def __init__(self, maker, truth, drive, hidden, begin):
@@ -252,7 +255,7 @@ class _Flight:
         return [*found, *self.hidden.rates(own, x[0], x[1])]
 
     def surface(self, t):
-        """By how much the first surface has come out."""
+        """Outward displacement of the first surface."""
         if not self.acts("surface"):
             return 0.0
         return float(self.hidden.at(0.0, 0.0, self.drive(t)[0], t - self.begin))
@@ -318,7 +321,7 @@ class _Flight:
         return found[:, : self.own], np.array(struck).reshape(-1, 3)
 
     def held(self, state, inputs):
-        """States at every sample, with an input that is held between them."""
+        """States at every sample, with an input held constant between samples."""
         if self.hidden is not None:
             state = np.concatenate([state, np.zeros(self.hidden.effect.states)])
         found, parts = [state], 4

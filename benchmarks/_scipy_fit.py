@@ -1,12 +1,13 @@
 """The baseline for the fit: scipy's least squares around `solve_ivp`, with impacts.
 
-As one would write it: a record is cut into windows of about a turn, each with a state
-of its own in the middle of a long flight; flights are `solve_ivp` with a terminal
-event, restarted at impacts; chatter ends at rest and rest at release. Parameters and
-states are freed together, by finite differences. It has several advantages: a sparse
-pattern, so that all states cost two columns of differences, steps well above the error
-of the integration, the drive as its encoder says, and the tolerances as a prior. It
-does not require that a window begins at the end of the previous one.
+It is written in the usual way: a record is cut into windows of about a turn, each with
+its own initial state in the middle of a long flight; flights are `solve_ivp` with a
+terminal event, restarted at impacts; chatter ends in sustained contact, and contact
+ends at release. Parameters and initial states are estimated together with finite
+differences. The baseline has several advantages: a sparsity pattern, so that all
+initial states cost two columns of differences; difference steps well above the
+integration error; the drive angle as measured by its encoder; and the tolerances as a
+prior. It does not require a window to begin where the previous one ends.
 """
 
 import dataclasses
@@ -32,13 +33,13 @@ NAMES = (
     "lag",
 )
 _TOLERANCE = 1e-8
-# Flights shorter than this, with all that follow, are rest (s)
+# Flights shorter than this (s), and all that follow, count as contact
 _REST = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
 class Window:
-    """About a turn of a record: samples, and the turn of the cam as `a + b t`."""
+    """About a turn of a record: samples, and the cam angle as `a + b t`."""
 
     time: np.ndarray
     samples: np.ndarray
@@ -48,7 +49,9 @@ class Window:
 
 
 def windows(part) -> list[Window]:
-    """From the middle of the longest flight of a turn to that of the next turn."""
+    """Windows from the middle of the longest flight of a turn to that of the next
+    turn.
+    """
     clock, samples = part.recording.time, part.recording["follower_angle_rad"]
     angle = part.drive.angle
     turn = np.floor((angle - angle[0]) / (2 * np.pi))
@@ -72,7 +75,9 @@ def windows(part) -> list[Window]:
 
 
 def predict(window: Window, state, values, rate: float, half: float) -> np.ndarray:
-    """The encoder's samples of a window; `rate` is K/J, `half` the profile's half."""
+    """The encoder samples of a window; `rate` is K/J, `half` the half height of the
+    profile.
+    """
     _, hook, long, spring_half, radius, eccentric, cx, cy, r, lag = values
     height = radius + half
     speed = window.speed
@@ -137,7 +142,7 @@ def predict(window: Window, state, values, rate: float, half: float) -> np.ndarr
         if longest > _REST * (1 - r):
             longest /= 2
             continue
-        # rest until the cam falls away faster than the follower
+        # contact until the cam falls away faster than the follower
         step, later = 1e-3, t
         while later < end and pull(later + step, surface(later + step)[0]) > 0:
             later += step
@@ -158,7 +163,9 @@ def predict(window: Window, state, values, rate: float, half: float) -> np.ndarr
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """CPU time in total, and of one iteration (a step and its differences)."""
+    """Result of scipy's fit: CPU time in total and per iteration (a step and its
+    differences).
+    """
 
     seconds: float
     iterations: int
@@ -175,7 +182,7 @@ class Rival:
 
 
 def fit_with_scipy(nominal, found: list[Window], parameters, limit: int) -> Rival:
-    """Fit some windows; `limit` counts steps."""
+    """Fit some windows in at most `limit` steps."""
     sigma = nominal.sensors.follower_floor
     inertia, half = nominal.inertia.value, nominal.follower_half_height.value
     tolerance = np.array([p.tolerance for p in parameters])
@@ -198,7 +205,7 @@ def fit_with_scipy(nominal, found: list[Window], parameters, limit: int) -> Riva
     def residual(x):
         nonlocal count
         count += 1
-        # one is nominal, so that steps are the same part of every tolerance
+        # one is nominal, so that steps are the same fraction of every tolerance
         values = middle + tolerance * (x[:10] - 1)
         rows = [math.sqrt(3.0) * (x[:10] - 1)]
         for k, window in enumerate(found):

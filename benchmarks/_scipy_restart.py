@@ -1,4 +1,5 @@
-"""The textbook in Python: `solve_ivp` with a terminal event, restarted at impacts.
+"""The textbook method in Python: `solve_ivp` with a terminal event, restarted at
+impacts.
 
 It also serves as the accuracy reference, with `method="DOP853"` and a tolerance of
 1e-12. Flight, impact, chatter, sticking and release follow the same rules as the other
@@ -59,7 +60,8 @@ def _lane(speed, r, start, turns, release, method, tolerance):
         slope = (spring(angle + 1e-5) - spring(angle - 1e-5)) / 2e-5
         j = slope * after + speed**3 * cam(theta, 3)
         state = np.array([contact_angle(theta), after])
-        # Half of the predicted flight, or the event at the start would hide the next.
+        # Half of the predicted flight; otherwise the event at the start would hide the
+        # next.
         first = abs(u / a)
         if a < 0 and abs(j) * u < CHATTER * (1 - r) * a * a:
             stuck = t - 2 * u / (a * (1 - r)) - 4 / 3 * j * u**2 / a**3 / (1 - r) ** 2
@@ -73,7 +75,7 @@ def _lane(speed, r, start, turns, release, method, tolerance):
 
 
 def simulate(workload: Workload, lanes=None, method="RK45", tolerance=1e-9):
-    """Run the given lanes (all by default).
+    """Run the given trajectories (all by default).
 
     Returns samples (lanes, turns, 2) at t = period, 2 period, ..., impacts (lanes,)
     and steps (lanes,).

@@ -1,8 +1,8 @@
 """Time several callables: one pinned core, interleaved runs, minimum CPU time.
 
-Other work on the machine only ever adds time, so the minimum over interleaved runs is
-the steadiest estimate. CPU time counts every thread of the process; on one pinned core
-a program that waits for its own threads gains nothing from them.
+Other work on the machine can only add time, so the minimum over interleaved runs is the
+most stable estimate. CPU time counts every thread of the process; on one pinned core a
+program gains nothing from threads.
 """
 
 import os
@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Timing:
-    """One row: minimum CPU seconds, work per second, and speed over the reference."""
+    """One row: minimum CPU seconds, work per second, and speed relative to the
+    reference.
+    """
 
     name: str
     seconds: float
@@ -39,11 +41,12 @@ def compare(
     reference: str | None = None,
     clock: Callable[[], float] = time.process_time,
 ) -> list[Timing]:
-    """Time the calls in turn, `repeats` rounds after one that warms up.
+    """Time the calls in turn, for `repeats` rounds after a warm-up round.
 
-    `work` is what one call does (turns, say), one number or one per name. Ratios are
-    rates over that of `reference`, the first name by default. A call must return only
-    when its result is ready. Raises ValueError when there is nothing to time.
+    `work` is the amount of work in one call (turns, for example): one number, or one
+    per name. Ratios are rates relative to that of `reference`, by default the first
+    name. A call must return only when its result is ready. Raises ValueError if there
+    is nothing to time.
     """
     if not calls or repeats < 1:
         raise ValueError("give at least one callable and at least one repeat")
@@ -62,7 +65,7 @@ def compare(
 
 
 def table(rows: list[Timing], unit: str = "turns") -> str:
-    """The rows as text, one a line."""
+    """The rows as text, one per line."""
     width = max(len(row.name) for row in rows)
     lines = [f"{'':{width}}  {'ms':>10}  {unit + '/s':>12}  {'ratio':>8}"]
     for row in rows:

@@ -1,4 +1,4 @@
-"""Hidden cases, and verdicts on them that survive an interrupted run."""
+"""Hidden cases, and verdicts that survive an interrupted run."""
 
 import json
 import math
@@ -12,14 +12,14 @@ from ._numba_rig import simulate
 from .coverage import recording
 
 
-# seconds until the motion has forgotten where it started
+# seconds until the motion no longer depends on its initial state
 SETTLE = 8.0
 
 
 def hidden_records(
     real, hidden, sensors, spans_rpm, duration: float, rng
 ) -> tuple[Recording, ...]:
-    """Records of one rig with something hidden, at a random speed of each span."""
+    """Records of one rig with a hidden effect, at one random speed from each range."""
     records = []
     for run, span in enumerate(spans_rpm, start=1):
         speed = rng.uniform(*span) * math.pi / 30
@@ -34,7 +34,7 @@ def close(true: float, value: float, stderr: float) -> bool:
 
 
 class Kept:
-    """Verdicts in a file of JSON lines; `key` says which case a verdict is on."""
+    """Verdicts in a file of JSON lines; `key` returns the case of a verdict."""
 
     def __init__(self, file: Path, key: Callable):
         self._file, self._key = file, key

@@ -1,8 +1,8 @@
 """The two workloads of the speed comparison, and the cam-follower they run on.
 
 Plain numpy, shared by every side of the comparison, so that all start from the same
-numbers. The system is Table 4.4 with the cam turning clockwise: cam angle
-`theta = -speed * t`, follower state `(angle, velocity)` in rad and rad/s.
+numbers. The system has the parameters of Table 4.4, with the cam turning clockwise: cam
+angle `theta = -speed * t`, follower state `(angle, velocity)` in rad and rad/s.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,9 @@ CHATTER = 1e-3
 
 @dataclass(frozen=True)
 class Workload:
-    """Lanes of one run; every array has shape (lanes,), `start` has (lanes, 2)."""
+    """The trajectories of one run; every array has shape (lanes,), except `start`
+    (lanes, 2).
+    """
 
     name: str
     speed: np.ndarray
@@ -47,7 +49,9 @@ def restitution(speed):
 
 
 def contact_angle(theta):
-    """Follower angle (4.23), in rad, when the cam at angle `theta` touches it."""
+    """Follower angle (rad) in contact with the cam at angle `theta` (thesis, eq.
+    (4.23)).
+    """
     x = ECCENTRICITY * np.cos(theta) + CENTRE[0]
     y = ECCENTRICITY * np.sin(theta) + CENTRE[1]
     return np.arcsin((HALF_HEIGHT + CAM_RADIUS) / np.hypot(x, y)) + np.arctan2(y, x)
@@ -66,7 +70,7 @@ CAM_COEFFICIENTS = _cam_coefficients()
 
 
 def cam(theta, order: int = 0):
-    """Derivative of the contact angle by the cam angle, of any order."""
+    """Derivative of any order of the contact angle with respect to the cam angle."""
     n = np.arange(len(CAM_COEFFICIENTS))
     wave, total = np.exp(1j * np.asarray(theta)), 0.0
     for coefficient in (CAM_COEFFICIENTS * (1j * n) ** order)[::-1]:
@@ -75,22 +79,23 @@ def cam(theta, order: int = 0):
 
 
 def spring(angle):
-    """Angular acceleration (4.9) of the free follower in rad/s^2."""
+    """Angular acceleration of the free follower in rad/s^2 (thesis, eq. (4.9))."""
     s, c = np.sin(angle), np.cos(angle)
     stretch = (SPRING_X * s + HALF_HEIGHT) / c - SPRING_REACH
     return -STIFFNESS / INERTIA * stretch * (SPRING_X + HALF_HEIGHT * s) / c**2
 
 
-# A follower at rest on the cam accelerates by spring - speed^2 cam, phase by phase.
+# Relative acceleration of a follower at rest on the cam at each phase: spring - speed^2
+# cam.
 _PHASES = np.linspace(0.0, 2 * np.pi, 721)
 _REST_SPRING, _REST_CAM = spring(cam(-_PHASES)), cam(-_PHASES, 2)
 
 
 def release_time(speed) -> np.ndarray:
-    """First time in (0, period] at which a follower at rest on the cam lets go.
+    """First time in (0, period] at which a follower at rest on the cam is released.
 
-    There the relative acceleration of the contact crosses zero upward. Infinite where
-    it never does. `speed` (lanes,) in rad/s; returns (lanes,) in s.
+    There the relative acceleration crosses zero upward; infinite if it never does.
+    `speed` (lanes,) is in rad/s; returns (lanes,) in s.
     """
     speed, back = np.unique(np.asarray(speed, float), return_inverse=True)
     values = _REST_SPRING - speed[:, None] ** 2 * _REST_CAM
@@ -100,7 +105,7 @@ def release_time(speed) -> np.ndarray:
     p, value = _PHASES[first], values[lanes, first]
     q, other = _PHASES[first + 1], values[lanes, first + 1]
     for _ in range(5):
-        # Secant; it stands still once both values agree.
+        # Secant method; it stops moving once both values agree.
         change = np.where(other != value, other - value, np.inf)
         p, value, q = q, other, q - other * (q - p) / change
         other = spring(cam(-q)) - speed**2 * cam(-q, 2)
@@ -108,7 +113,9 @@ def release_time(speed) -> np.ndarray:
 
 
 def sweep(lanes: int = 256, turns: int = 100) -> Workload:
-    """W1: speeds in 130..160 rpm, each from rest 0.02 rad above the cam at t = 0."""
+    """W1: speeds from 130 to 160 rpm, each started at rest 0.02 rad above the cam at t
+    = 0.
+    """
     speed = np.linspace(130, 160, lanes) * np.pi / 30
     start = np.zeros((lanes, 2))
     start[:, 0] = contact_angle(0.0) + 0.02

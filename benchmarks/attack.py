@@ -3,12 +3,12 @@
     python -m benchmarks.attack --systems 1000
     python -m benchmarks.attack --seed 17
 
-Systems of one to three coordinates and one to three gaps: springs, damping, gyroscopic
-coupling, harmonic and narrow forces, moving walls, oblique normals, restitution that
-falls with speed, rest and release, in length units of 1e-6 to 1e6, time units of 1e-3
-to 1e3 s, from times of up to 1e4 s. It prints every system that disagrees, with its
-seed, and a table. The exit code is 1 if one disagrees, or is rejected for a reason that
-is not in docs/limits.md.
+Systems have one to three coordinates and one to three gaps, with springs, damping,
+gyroscopic coupling, harmonic forces and short force pulses, moving walls, oblique
+normals, restitution that falls with speed, sticking and release, in length units of
+1e-6 to 1e6 m and time units of 1e-3 to 1e3 s, starting at times of up to 1e4 s. Every
+system that disagrees is printed with its seed, followed by a table. The exit code is 1
+if a system disagrees, or is rejected for a reason that is not in docs/limits.md.
 """
 
 import argparse
@@ -20,12 +20,14 @@ from ._attack_systems import draw, Problem, SHAPES
 from ._attack_verdict import judge, know, plain, Verdict
 
 
-#: verdicts that are not in order
+# : verdicts that indicate a defect
 WRONG = ("DISAGREES", "MISBLAMES")
 
 
 def attack(problem: Problem, sampled: bool = True) -> Verdict:
-    """The verdict on a problem; a disagreement says whether units alone cause it."""
+    """The verdict on a problem; for a disagreement, also whether only these units cause
+    it.
+    """
     known = know(problem)
     verdict = judge(problem, known, sampled=sampled)
     if verdict.label != "DISAGREES" or problem.length == problem.time == 1.0:
@@ -45,10 +47,10 @@ def describe(problem: Problem) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--systems", type=int, default=100)
-    parser.add_argument("--first", type=int, default=0, help="the first seed")
-    parser.add_argument("--seed", type=int, help="this one only")
-    parser.add_argument("--shapes", nargs="+", type=int, help="some of the shapes only")
-    parser.add_argument("--plain", action="store_true", help="in units of one")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--seed", type=int, help="run only this seed")
+    parser.add_argument("--shapes", nargs="+", type=int, help="run only these shapes")
+    parser.add_argument("--plain", action="store_true", help="use unit scales")
     options = parser.parse_args()
     seeds = (
         [options.seed]

@@ -1,9 +1,10 @@
-"""Measure the cost of a point on a branch: jaxcam, alone and in a batch, and AUTO-07p.
+"""Measure the cost per point of a branch: jaxcam, singly and in a batch, and AUTO-07p.
 
     python -m benchmarks.continuation
 
-One pinned core, float64, minimum CPU time of interleaved runs after one that compiles.
-AUTO-07p (`auto`, Debian package auto-07p) is run for comparison if it is installed.
+One pinned core, float64, minimum CPU time of interleaved runs after one for
+compilation. AUTO-07p (`auto`, Debian package auto-07p) is run for comparison if it is
+installed.
 """
 
 import os
@@ -25,7 +26,7 @@ import continuation
 from jaxcam.models import ImpactOscillator
 
 
-# the cusp, its two folds on the way: as simple as a branch can be
+# the cusp normal form, with its two folds: a minimal branch
 def cusp(u, p):
     return p["a"] + p["b"] * u + u**3
 
@@ -77,7 +78,7 @@ RL0=-3.0, RL1=3.0
 
 
 def singles() -> None:
-    """Milliseconds per point, including the location of special points."""
+    """Print the milliseconds per point, including the location of special points."""
     equilibria = continuation.Equilibrium(cusp, {"a": 2.0, "b": -1.0})
     points = continuation.FixedPoint(henon, {"a": 0.0, "b": 0.5})
     one = continuation.branch(equilibria, [-1.5], a, (-3, 3), direction=-1)
@@ -111,10 +112,10 @@ def wall(system):
 
 
 def orbits() -> None:
-    """Orbits with one impact of the forced oscillator, multipliers included.
+    """Time orbits of the forced oscillator with one impact, multipliers included.
 
-    Started at half the phase of the closed form: with V the speed of impact,
-    (1 - r) V / (2 w) = |gamma| sin(phi), wall = |gamma| cos(phi) - k V.
+    The start is at half the phase of the closed form: with V the impact speed, (1 - r)
+    V / (2 w) = |gamma| sin(phi), wall = |gamma| cos(phi) - k V.
     """
     w, r, phi = 2.8, 0.8, 0.5
     gamma = 1 / (1 - w * w)
@@ -140,7 +141,7 @@ def orbits() -> None:
 
 
 def batches(lanes: int = 100) -> None:
-    """A hundred branches in one program, and one after the other."""
+    """Time a hundred branches in one program, and one after the other."""
     values = np.linspace(-2.0, -0.5, lanes)
     starts = []
     for value in values:
@@ -166,7 +167,7 @@ def batches(lanes: int = 100) -> None:
 
 
 def auto() -> None:
-    """The same cusp branch with AUTO-07p."""
+    """Time the same cusp branch with AUTO-07p."""
     program = shutil.which("auto") or shutil.which("auto-07p")
     if program is None:
         print("  auto is not installed (Debian package auto-07p): not compared")

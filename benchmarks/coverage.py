@@ -1,27 +1,28 @@
 """Measure how often the 95 % intervals contain the true values.
 
-Rigs drawn at random from the box of tolerances, simulated by a scalar Runge-Kutta loop
-that shares nothing with the fit, recorded through noisy encoders at three noise levels,
-cut, and fitted. Prints, for each level and parameter: the share of intervals that
-contain the true value, the mean error (bias) and the spread of the errors in standard
+Rigs are drawn at random from the tolerance box, simulated by a scalar Runge-Kutta loop
+that shares no code with the fit, recorded through noisy encoders at three noise levels,
+cut, and fitted. The script prints, for each level and parameter, the share of intervals
+that contain the true value, and the mean (bias) and spread of the errors in standard
 errors; and the residuals. Parameters that the data do not determine depend on the
 tolerances, so only another rig is an independent case: many rigs are more informative
-than many draws of the noise.
+than many noise realizations.
 
 The bias has two parts: one from the choice of rigs, which a linear model without noise
-also has, and the rest, which is due to the fit. Both are printed with their errors,
-from the scatter between rigs: fits of one rig are not independent.
+would also have, and the rest, which is due to the fit. Both are printed with their
+standard errors, from the scatter between rigs, since fits of one rig are not
+independent.
 
-`--mirror` fits every rig together with the one on the other side of the nominal values,
-and every draw of the noise with its negative. Each is as likely as the other, so the
-mean error is what it was, while all that is linear in tolerances and noise cancels: the
-bias is then known several times better than from as many independent fits.
+`--mirror` fits every rig together with its mirror image about the nominal values, and
+every noise realization with its negative. Both are equally likely, so the expected
+error is unchanged, while everything linear in tolerances and noise cancels: the bias is
+then known several times more accurately than from the same number of independent fits.
 
-`--truth normal` draws the rigs from the Gaussian by which the fit knows a tolerance;
-the difference to `box` is what the shape of the box does. `--profile` checks for some
-parameters whether the interval of the profile likelihood contains the true value. The
+`--truth normal` draws the rigs from the Gaussian that represents a tolerance in the
+fit; the difference from `box` is the effect of the box shape. `--profile` checks for
+some parameters whether the profile-likelihood interval contains the true value. The
 last line is the share of cases in which all parameters together are inside the 95 %
-ellipsoid, and inside the region that the cost itself bounds.
+ellipsoid, and inside the region bounded by the cost itself.
 
     python benchmarks/coverage.py --rigs 20 --draws 5
     python benchmarks/coverage.py --rigs 100 --draws 1 --levels 1
@@ -49,7 +50,7 @@ DURATION, SETTLE = 2.0, 6.0
 
 
 class Mirrored:
-    """The random numbers of a generator, on the other side of their mean."""
+    """The random numbers of a generator, mirrored about their mean."""
 
     def __init__(self, seed):
         self._rng = np.random.default_rng(seed)
@@ -65,14 +66,14 @@ class Mirrored:
 
 
 def both_sides(rng, mirror: bool):
-    """A generator of its own, and with `mirror` a second one that mirrors it."""
+    """A separate generator and, with `mirror`, a second one that mirrors it."""
     seed = int(rng.integers(2**62))
     first = np.random.default_rng(seed)
     return [first, Mirrored(seed)] if mirror else [first]
 
 
 def random_rig(nominal, rng, shape: str = "box") -> RealRig:
-    """A random rig within the tolerances, without friction of the hinge."""
+    """A random rig within the tolerances, without hinge friction."""
 
     def draw(quantity):
         if shape == "normal":
@@ -123,11 +124,12 @@ def recording(truth: Truth, sensors, name: str, rng) -> Recording:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One fit; `off` has error and standard error, `held` the cost of the truth.
+    """One fit; `off` contains the errors and standard errors, `held` the cost of the
+    truth.
 
-    Cases of one `group` share a draw of the rig; groups are independent. `drawn` is
-    the error that the tolerances alone make of this truth: where the data do not see,
-    an estimate stays at its nominal value however the rig was drawn.
+    Cases of one `group` share a rig; groups are independent. `drawn` is the error due
+    to the tolerances alone: if the data carry no information about a parameter, its
+    estimate stays at the nominal value for every rig.
     """
 
     group: int
@@ -142,7 +144,7 @@ class Case:
 
 
 def at_level(nominal, level: float):
-    """The rig file with other noise; the encoders' counts stay."""
+    """The rig file with another noise level; the encoder counts are unchanged."""
     sensors = dataclasses.replace(
         nominal.sensors,
         follower_noise=level * nominal.sensors.follower_noise,
@@ -228,15 +230,16 @@ def mean_and_error(values, groups) -> tuple[float, float]:
 
 
 def distance(fit, truth) -> float:
-    """Of all parameters together, a chi-square of as many degrees."""
-    # in standard errors: parameters of very different size would lose the small ones
+    """Chi-square of all parameters together, with as many degrees of freedom."""
+    # in standard errors: otherwise parameters of small magnitude would be lost
     z = np.array([(e.value - truth[e.name]) / e.stderr for e in fit.estimates])
     return float(z @ np.linalg.solve(fit.correlation, z))
 
 
 def drawn_error(fit, truth) -> dict[str, float]:
-    """Of a linear model without noise: C P (nominal - truth), with the covariance C and
-    the information P of the tolerances."""
+    """Error of a linear model without noise: C P (nominal - truth), with the covariance
+    C and the information P of the tolerances.
+    """
     names = [e.name for e in fit.estimates]
     problem = fit.problem
     start = dict(zip(problem.names, np.asarray(problem.start.values[0])))
@@ -264,7 +267,7 @@ def report(found) -> None:
             drawn = np.array([case.drawn[name] / case.off[name][1] for case in cases])
             groups = [case.group for case in cases]
             bias, bias_error = mean_and_error(z, groups)
-            # what is left has the noise in it, and what is bent in the model
+            # the remainder comes from the noise and the nonlinearity of the model
             rest, rest_error = mean_and_error(z - drawn, groups)
             held = ""
             if name in cases[0].held:

@@ -1,9 +1,10 @@
-"""Measure the time of a fit, compared with scipy's least squares around solve_ivp.
+"""Measure the time of a fit, and compare it with scipy's least squares around
+solve_ivp.
 
 Both start at the nominal rig and fit the same ten parameters to the same records, with
-impacts, chatter and rest (`_scipy_fit.py`). The rival is run on a few turns until it
-ends; its time for all records is the time of one iteration, scaled by how much motion
-there is, times the iterations that it took.
+impacts, chatter and sustained contact (`_scipy_fit.py`). The scipy baseline is run on a
+few turns until it ends; its time for all records is the time per iteration, scaled to
+the total duration of the motion, times the number of iterations.
 
     python benchmarks/fitting.py --runs 6 --turns 3
 """
@@ -42,16 +43,22 @@ def make_runs(number: int, seed: int = 4):
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--runs", type=int, default=6)
-    parser.add_argument("--turns", type=int, default=3, help="of each run, by scipy")
-    parser.add_argument("--rival-runs", type=int, default=2, help="runs that scipy has")
-    parser.add_argument("--steps", type=int, default=30, help="of scipy at most")
+    parser.add_argument(
+        "--turns", type=int, default=3, help="turns of each run fitted by scipy"
+    )
+    parser.add_argument(
+        "--rival-runs", type=int, default=2, help="runs fitted by scipy"
+    )
+    parser.add_argument(
+        "--steps", type=int, default=30, help="maximum number of scipy steps"
+    )
     options = parser.parse_args()
     nominal, runs = make_runs(options.runs)
     segments = segment_case(runs, nominal)
     model = fitting.cam_follower_model(nominal)
     parameters = fitting.cam_follower_parameters(nominal)
     sensor = "follower_angle_rad"
-    # a tenth parameter: the encoder of the follower may be late
+    # a tenth parameter: the delay of the follower encoder
     parameters.append(
         fitting.Parameter("lag", lambda m: m.sensors[sensor].lag, tolerance=1e-4)
     )
@@ -75,7 +82,7 @@ def main() -> None:
     )
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
     print(f"peak memory {peak:.2f} GB", flush=True)
-    # spread over the speeds, since chatter costs a rival by events much
+    # spread over the speeds, since chatter is expensive for an event-driven baseline
     chosen = np.linspace(0, options.runs - 1, options.rival_runs).astype(int)
     cut = [windows(part) for part in segments]
     whole = sum(float(w.time[-1] - w.time[0]) for turns in cut for w in turns)

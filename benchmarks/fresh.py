@@ -1,12 +1,12 @@
-"""Count right verdicts on random cases: is only the hidden effect named?
+"""Count correct verdicts on random cases: is the hidden effect named, and nothing else?
 
-Rigs anywhere in the box of tolerances, six records of four seconds at random speeds,
-made by a scalar loop (`_numba_rig`) that shares nothing with the diagnosis. Of twenty
-cases three lack nothing, thirteen lack one term, four lack two. A strength is a unit of
-the term (about what a careless rig maker would leave in) times one of `LEVELS`; most
-are hidden in part by a refit of the rig. Prints one line a case and the shares that
-are right, and keeps each verdict in a file of JSON lines, from which an interrupted run
-goes on.
+Rigs are drawn from anywhere in the tolerance box, with six records of four seconds at
+random speeds, made by a scalar loop (`_numba_rig`) that shares no code with the
+diagnosis. Of twenty cases, three lack nothing, thirteen lack one term, and four lack
+two. A strength is the unit of a term (roughly a typical defect) times one of `LEVELS`;
+most effects are partly absorbed when the rig parameters are refitted. The script prints
+one line per case and the shares of correct verdicts, and stores each verdict in a file
+of JSON lines, from which an interrupted run resumes.
 
     python -m benchmarks.fresh --cases 40 [--rig rig.toml]
 """
@@ -92,7 +92,7 @@ def judged(nominal, number: int) -> dict:
 
 
 def _sizes(case: Case, found: Diagnosis) -> dict:
-    """True strength, strength and error of each named true term."""
+    """True strength, estimated strength and its error for each correctly named term."""
     sizes = {}
     for effect in found.effects:
         if effect.name in case.names:
@@ -144,7 +144,7 @@ def _said(one: dict) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cases", type=int, default=40)
-    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--first", type=int, default=0, help="number of first case")
     parser.add_argument("--rig", type=Path, default=DEMO_RIG / "rig.toml")
     parser.add_argument("--file", type=Path, default=Path("fresh.jsonl"))
     options = parser.parse_args()

@@ -1,11 +1,11 @@
-"""Test hostile files and command lines for a given time.
+"""Test malformed files and command lines for a given time.
 
     python -m benchmarks.fuzz --minutes 20
     python -m benchmarks.fuzz --minutes 2 --only tables --seed 7
 
-What is tried, and what counts as a defect, is what tests/test_hardening_*.py try a few
-times. Each defect is printed with the smallest input that shows it; the exit code is
-the number of properties that failed.
+The inputs and the definition of a defect are those of tests/test_hardening_*.py, which
+try only a few. Each defect is printed with the smallest input that reproduces it; the
+exit code is the number of properties that failed.
 """
 
 import argparse
@@ -25,12 +25,12 @@ import hostile_files
 from hypothesis import given, HealthCheck, Phase, seed, settings, strategies as st
 
 
-# examples of one property before the next has its turn
+# number of examples of one property before moving on to the next
 _BATCH = 200
 
 
 def properties(folder: Path, counts: collections.Counter):
-    """Each property by name, as a test that hypothesis can run."""
+    """The properties by name, as tests that hypothesis can run."""
     gaps = st.sampled_from(["refuse", "split", "mend"])
 
     def tables(file, gaps):

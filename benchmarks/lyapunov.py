@@ -3,9 +3,9 @@
     python -m benchmarks.lyapunov                 # 1000 values, 2000 turns
     python -m benchmarks.lyapunov --lanes 128 --turns 200
 
-The damped forced oscillator with about one impact a turn, frequencies between 3.2 and
-3.9 (orbits with one impact, and chaos). One pinned core, minimum CPU time of
-interleaved runs, tolerance 1e-9 on both sides. Needs `pip install -e ".[bench]"`.
+The damped forced oscillator with about one impact per period, at frequencies between
+3.2 and 3.9 (orbits with one impact, and chaos). One pinned core, minimum CPU time of
+interleaved runs, tolerance 1e-9 on both sides. Requires `pip install -e ".[bench]"`.
 """
 
 from benchmarks import _timing
@@ -28,7 +28,7 @@ FAST = Settings(tolerance=1e-9, chatter_depth=1.0)
 
 
 def main(lanes: int = 1000, turns: int = 2000, repeats: int = 3) -> None:
-    """Print both speeds, and the agreement of the exponents."""
+    """Print the speeds of both programs, and the agreement of their exponents."""
     omega = np.linspace(3.2, 3.9, lanes)
     system = ImpactOscillator(restitution=R, wall=WALL, damping=DAMPING)
 
@@ -60,7 +60,8 @@ def main(lanes: int = 1000, turns: int = 2000, repeats: int = 3) -> None:
     gone = np.abs(np.asarray(made.exponents) - exponents).max(axis=1)[calm]
     rule = -2 * DAMPING + 2 * np.log(R) * np.asarray(made.impact_rate)
     sums = np.asarray(made.exponents).sum(axis=1)
-    # a chaotic motion may come to rest on the wall, which the loop does not look for
+    # a chaotic motion may come to rest on the wall, which the numba loop does not
+    # handle
     free = np.isfinite(sums)
     print(
         f"impacts a turn {hits.sum() / lanes / turns:.2f} ({rate.sum():.0f} against "

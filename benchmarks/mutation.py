@@ -1,18 +1,18 @@
-"""Test whether the tests of the event loop detect a changed line.
+"""Check whether the tests of the event loop detect a changed line.
 
     python -m benchmarks.mutation --mutants 300 --workers 2 --report mutants.jsonl
     python -m benchmarks.mutation --again mutants.jsonl --tests tests/test_motion_*.py
 
-Needs `pip install cosmic-ray`, and tries what is committed: each worker changes a copy
-of HEAD in a temporary folder. All mutants of the modules below, in lines that the tests
-run, are listed and shuffled. The tests are one run of pytest that ends at the first
-failure: parts of one step first, then closed forms that few programs serve, then
-everything else, so that only survivors take all the time. Programs are compiled without
-optimisation.
+Requires `pip install cosmic-ray`, and tests the committed code: each worker changes a
+copy of HEAD in a temporary folder. All mutants of the modules below, in lines that the
+tests run, are listed and shuffled. The tests are one pytest run that stops at the first
+failure: first the parts of one step, then closed forms that need few programs, then
+everything else, so that only survivors take the full time. Programs are compiled
+without optimisation.
 
-A survivor is printed as a difference, and called "no change" where jaxcam makes the
-same programs of it; `--again` tries survivors with more tests. A report is gone on
-with: what it lists is not tried again.
+A survivor is printed as a diff, or reported as "no change" if jaxcam generates the same
+programs from it; `--again` tries survivors with more tests. An existing report is
+continued: mutants listed in it are not tried again.
 """
 
 import argparse
@@ -37,23 +37,23 @@ MODULES = (
 TESTS = [
     "tests/test_motion_parts.py",
     "tests/test_motion_rules.py",
-    # one program or two each, and most of what a motion can do
+    # one or two programs each, covering most kinds of motion
     "tests/test_motion_exact.py::test_launched_ball_bounces_and_rests",
     "tests/test_motion_exact.py::test_ball_leaves_the_table_where_it_falls_faster_than_free",
     "tests/test_more_degrees.py::test_two_masses",
     "tests/test_motion_chatter_map.py",
     "tests/test_motion_exact.py",
     "tests/test_more_degrees.py",
-    # what takes longest to compile
+    # without the tests that take longest to compile
     "-k=not square and not LevelInTime and not steady and not diffeq and not two_stops",
 ]
-# operators that no line of the loop survives say nothing of its tests
+# operators whose mutants are always detected say nothing about the tests
 _SENSELESS = "FloorDiv Mod Pow LShift RShift BitXor Is IsNot".split()
 _BITS = {"BitAnd", "BitOr"}
-# a loop that does not end is noticed: seconds for one mutant, and times what the tests
-# take without one
+# to detect an endless loop: time limit (s) for one mutant, and as a multiple of the
+# time that the tests take without a mutant
 _PATIENCE, _TIMES = 60.0, 3.0
-# tests of values do not need fast programs
+# tests of values do not require fast programs
 _FLAGS = "--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true"
 
 
@@ -78,7 +78,7 @@ def mutants(database: str) -> list:
 
 
 class Copy:
-    """A copy of HEAD in a folder of its own, with compiled programs of its own."""
+    """A copy of HEAD in its own folder, with its own compiled programs."""
 
     def __init__(self, folder: str):
         self.folder = Path(folder)
@@ -94,7 +94,7 @@ class Copy:
         self.programs: set[Path] = set()
 
     def keep_programs(self) -> None:
-        """Programs compiled so far are kept for every mutant."""
+        """Keep the programs compiled so far for every mutant."""
         self.programs = set((self.folder / "cache").rglob("*"))
 
     def drop_programs(self) -> None:
@@ -114,7 +114,7 @@ def _digest() -> str:
 
 
 def work(tests, drawn, tasks, results) -> None:
-    """Try mutants by their numbers until a `None` comes."""
+    """Try mutants by number until a `None` arrives."""
     from cosmic_ray.mutating import mutate_and_test, use_mutation
     from cosmic_ray.plugins import get_operator
 
@@ -140,7 +140,7 @@ def work(tests, drawn, tasks, results) -> None:
 
 
 def lines_run(tests) -> dict:
-    """Numbers of the lines of each module that the tests run."""
+    """Line numbers of each module that the tests run."""
     files = [f"jaxcam/hybrid/{name}.py" for name in MODULES]
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(folder)
@@ -155,7 +155,9 @@ def lines_run(tests) -> dict:
 
 
 def _listed(tests, report: Path | None) -> list:
-    """The mutants in lines that the tests run; the lines are kept beside a report."""
+    """The mutants in lines that the tests run; the line numbers are stored next to the
+    report.
+    """
     here = Path.cwd()
     commit = subprocess.run(
         ["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True
@@ -188,12 +190,16 @@ def _name(mutant) -> dict:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mutants", type=int, default=300)
-    parser.add_argument("--minutes", type=float, default=1e9, help="and no longer")
+    parser.add_argument("--minutes", type=float, default=1e9, help="time limit")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--tests", nargs="+", default=TESTS, help="or other tests")
-    parser.add_argument("--report", type=Path, help="what came of each, one a line")
-    parser.add_argument("--again", type=Path, help="a report: try its survivors")
+    parser.add_argument("--tests", nargs="+", default=TESTS, help="tests to run")
+    parser.add_argument(
+        "--report", type=Path, help="file for the outcomes, one per line"
+    )
+    parser.add_argument(
+        "--again", type=Path, help="report whose survivors are tried again"
+    )
     options = parser.parse_args()
     drawn = _listed(options.tests, options.report)
     random.Random(options.seed).shuffle(drawn)
@@ -215,7 +221,7 @@ def main() -> None:
     for worker in workers:
         worker.start()
     end, counts = time.monotonic() + 60 * options.minutes, {}
-    # one at a time, so that nothing is left in the queue when the time is over
+    # one at a time, so that nothing is left in the queue when the time is up
     waiting, at_work = iter(todo), len(workers)
     while at_work:
         outcome, spent, number, difference = results.get()

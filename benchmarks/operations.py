@@ -1,9 +1,10 @@
-"""Count the scalar operations of an attempt at a step, by purpose.
+"""Count the scalar operations of an attempted step, by purpose.
 
     python -m benchmarks.operations
 
-Counts the program of one attempt on the cam-follower, before the compiler fuses it.
-Divisions and square roots cost several additions each. Then the attempts of a turn.
+Operations are counted in the program of one attempt for the cam-follower, before the
+compiler fuses it. A division or square root costs as much as several additions. The
+number of attempts per turn follows.
 """
 
 import collections
@@ -22,7 +23,7 @@ from jaxcam.hybrid.loop._loop_state import first_state
 from jaxcam.models import CamFollower, rpm_to_rad_s
 
 
-#: function of the loop that an operation is called from, the innermost first
+# : function of the loop from which an operation is called, innermost first
 PARTS = {
     "step": "stages of the step",
     "error_norm": "stages of the step",
@@ -42,7 +43,7 @@ OTHER = "everything else"
 
 
 def program():
-    """The operations of one attempt, those of unused results left out."""
+    """The operations of one attempt, excluding those whose results are unused."""
     system = CamFollower().prepared()
     zero, one = jnp.asarray(0.0), jnp.asarray(1.0)
     plan = Plan.of(system, Settings(), zero, one, stop_period=system.period)
@@ -62,7 +63,9 @@ def program():
 
 
 def operations(jaxpr):
-    """Names of the operations, those of calls included, and who asked for them."""
+    """Names of the operations, including those inside calls, and the functions that use
+    them.
+    """
     for equation in jaxpr.eqns:
         inner = [p for p in equation.params.values() if hasattr(p, "jaxpr")]
         if inner:
@@ -75,15 +78,17 @@ def operations(jaxpr):
 
 def part_of(equation) -> str:
     frames = equation.source_info.traceback.frames
-    # a name within a class, without what is within it
+    # qualified name, without nested functions
     names = [f.function_name.split(".<")[0].rpartition(".")[2] for f in frames]
     return next((PARTS[name] for name in names if name in PARTS), OTHER)
 
 
 def attempts(rpm: float = 145.0, settled: int = 50, turns: int = 100) -> str:
-    """In a turn of the settled motion, which is P(oo,1), and what happens in it.
+    """Describe the attempts and events in a turn of the settled motion, which is
+    P(inf,1).
 
-    Steps remember the lengths before them: how many there are depends on the start.
+    A step length depends on the previous ones, so the number of steps depends on the
+    start.
     """
     system = CamFollower(speed=rpm_to_rad_s(rpm))
     starts = np.stack([np.linspace(0.26, 0.3, 8), np.zeros(8)], axis=1)

@@ -1,9 +1,10 @@
 """Test intervals and verdicts on user-defined rigs with known answers.
 
-Rigs of `docs/rigs` are drawn at random within their tolerances, simulated without
-missing physics by independent code, recorded through noisy sensors, and fitted: in how
-many cases does the 95 % interval of each parameter contain the true value? With
-`--diagnose` each case is diagnosed as well: how many verdicts are not `none`?
+The rigs in `docs/rigs` are drawn at random within their tolerances, simulated by
+independent code without hidden effects, recorded through noisy sensors, and fitted. The
+script counts the cases in which the 95 % interval of each parameter contains the true
+value. With `--diagnose` each case is also diagnosed, and verdicts other than `none` are
+counted.
 
     python -m benchmarks.own_rigs two_stops --cases 100
     python -m benchmarks.own_rigs stage --cases 20 --diagnose
@@ -24,7 +25,7 @@ RIGS = Path(__file__).parent.parent / "docs" / "rigs"
 
 
 def drawn(setup, rng) -> dict[str, float]:
-    """A rig anywhere within the tolerances."""
+    """A random rig within the tolerances."""
     found = {}
     for one in setup.parameters:
         nominal = one.nominal
@@ -35,7 +36,9 @@ def drawn(setup, rng) -> dict[str, float]:
 
 
 def case_of(name: str, setup, seed: int):
-    """Truth and recordings of a case; rigs whose impacts accumulate are passed over."""
+    """True parameters and recordings of a case; rigs whose impacts accumulate are
+    skipped.
+    """
     rng = np.random.default_rng(seed)
     while True:
         truth = drawn(setup, rng)
@@ -49,7 +52,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rig", choices=sorted(MAKERS))
     parser.add_argument("--cases", type=int, default=10)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first case")
+    parser.add_argument("--first", type=int, default=0, help="seed of first case")
     parser.add_argument("--diagnose", action="store_true")
     args = parser.parse_args()
     setup = read_setup(RIGS / f"{args.rig}.toml")

@@ -2,8 +2,8 @@
 
     python -m benchmarks.own_system
 
-The system is a forced pendulum that leans on a wall, described as in the README, with a
-grid of initial states. One pinned core, minimum CPU time of interleaved runs, tolerance
+The system is a forced pendulum leaning on a wall, defined as in the README, with a grid
+of initial states. One pinned core, minimum CPU time of interleaved runs, tolerance
 1e-9.
 """
 
@@ -25,7 +25,9 @@ SETTINGS = Settings(tolerance=1e-9, chatter_depth=1.0, backend="llvm")
 
 
 class Pendulum(jaxcam.HybridSystem):
-    """Units in which gravity over length is one."""
+    """A forced pendulum at a wall, in units in which gravity divided by length is
+    one.
+    """
 
     wall: float = 0.1  # rad
     restitution: float = 0.75
@@ -50,7 +52,7 @@ class Pendulum(jaxcam.HybridSystem):
 
 
 def main(side: int = 48, turns: int = 60, repeats: int = 3) -> None:
-    """`side` x `side` states over `turns` periods of the forcing."""
+    """Simulate `side` x `side` states over `turns` forcing periods."""
     angle, rate = np.meshgrid(np.linspace(0.15, 1.5, side), np.linspace(-1, 1, side))
     start = np.column_stack([angle.ravel(), rate.ravel()])
     system = Pendulum()

@@ -1,10 +1,11 @@
-"""Measure how often an effect is named, by its strength, and how often falsely.
+"""Measure how often an effect is named, as a function of its strength, and how often
+falsely.
 
-Rigs drawn at random from the box of tolerances, one effect or none, three records of
-two seconds at random speeds, made by a scalar loop (`_numba_rig`) that shares nothing
-with the diagnosis. Strengths are multiples of the least one that a diagnosis of the
-same kind of records says it would name. Prints a table and keeps each verdict in a file
-of JSON lines, from which an interrupted run goes on.
+Rigs are drawn at random from the tolerance box, with one effect or none and three
+records of two seconds at random speeds, made by a scalar loop (`_numba_rig`) that
+shares no code with the diagnosis. Strengths are multiples of the detection limit
+reported by a diagnosis of similar records. The script prints a table and stores each
+verdict in a file of JSON lines, from which an interrupted run resumes.
 
     python -m benchmarks.power --nulls 200 --first 200
     python -m benchmarks.power --effects --draws 10
@@ -31,7 +32,7 @@ from .coverage import random_rig
 DURATION = 2.0
 SPANS_RPM = ((128.0, 145.0), (146.0, 158.0), (159.0, 175.0))
 LEVELS = (0.5, 1.0, 2.0, 4.0)
-#: name of the effect, its number in `Hidden`, and a unit where no limit is stated
+# : name of the effect, its number in `Hidden`, and a unit if no limit is reported
 EFFECTS = {
     "viscous_damping": ("c1", None),
     "coulomb_friction": ("fc", None),
@@ -43,7 +44,7 @@ EFFECTS = {
     "external_vibration": ("ext", 0.03),
     "drive_ripple": ("eps", 1e-5),
 }
-#: effects that have no name, and strengths at which they matter
+# : unnamed effects, and strengths at which they matter
 UNLISTED = {"imbalance": 0.3, "fading": 0.005, "step": 0.1, "one_way": 0.1}
 
 
@@ -56,7 +57,7 @@ def case(nominal, hidden: Hidden, rng) -> tuple[Recording, ...]:
 
 
 def judged(nominal, effect: str, strength: float, number: int) -> dict:
-    """Verdict on one case, whose rig and noise follow from its number."""
+    """Verdict on one case, whose rig and noise are determined by its number."""
     rng = np.random.default_rng([number, sum(effect.encode())])
     field = EFFECTS[effect][0] if effect in EFFECTS else effect
     hidden = Hidden() if effect == "none" else Hidden(**{field: strength})
@@ -78,7 +79,7 @@ def judged(nominal, effect: str, strength: float, number: int) -> dict:
 
 
 class Verdicts:
-    """Verdicts by effect, strength and number of the case."""
+    """Verdicts by effect, strength and case number."""
 
     def __init__(self, file: Path):
         self._nominal = read_rig(DEMO_RIG / "rig.toml")

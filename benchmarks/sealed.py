@@ -1,7 +1,7 @@
 """Score the sealed cases: compare the verdicts of docs/sealed with the keys.
 
-The keys were published after the verdicts, with the SHA-256 announced before; the
-script refuses any other file. It prints one table row per case, and the score.
+The keys were published after the verdicts, and their SHA-256 had been announced before;
+the script rejects any other file. It prints one table row per case, and the score.
 
     python -m benchmarks.sealed KEYS.json [--verdicts docs/sealed/verdicts.json]
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 
 #: announced before the verdicts were made
 ANNOUNCED = "b325e7e4dc2082498320961c9ce65df65c319d6a59767212f9791ea104cf4b01"
-#: effects without a name of their own, which are rightly called unknown
+# : effects without a name, for which `unknown` is correct
 NAMED = {
     "viscous_damping",
     "coulomb_friction",
@@ -31,7 +31,7 @@ NAMED = {
 def read_keys(file: Path) -> dict[str, dict]:
     """The true effects of each case, with their parameters.
 
-    **Raises:** `ValueError` where the file is not the one announced.
+    **Raises:** `ValueError` if the file is not the one announced.
     """
     data = file.read_bytes()
     found = hashlib.sha256(data).hexdigest()
@@ -49,9 +49,9 @@ def said(verdict: dict) -> dict:
 
 
 def right(truth: dict, verdict: dict) -> bool:
-    """Whether all effects with a name are named and no other one is.
+    """Whether the verdict names exactly the true effects.
 
-    Where something without a name is at work, `unknown` is right.
+    If one of them has no name, `unknown` is correct.
     """
     if not truth:
         return verdict["verdict"] == "none"
@@ -61,10 +61,10 @@ def right(truth: dict, verdict: dict) -> bool:
 
 
 def strengths(truth: dict, verdict: dict) -> list[tuple[str, float, float, float]]:
-    """Parameter, true value, found value and standard error of the effects that both
-    name.
+    """Parameter, true value, estimate and standard error of the effects in both key and
+    verdict.
 
-    The keys do not tell the phase of a vibration.
+    The keys do not give the phase of a vibration.
     """
     return [
         (parameter, true, value[parameter]["value"], value[parameter]["stderr"])
@@ -90,7 +90,7 @@ def line(case: str, truth: dict, verdict: dict) -> str:
 
 
 def main(arguments: argparse.Namespace) -> None:
-    """Print table and score."""
+    """Print the table and the score."""
     truths = read_keys(arguments.keys)
     verdicts = {v["case"]: v for v in json.loads(arguments.verdicts.read_text("utf-8"))}
     print("| case | truth | verdict | right | strengths |\n|---|---|---|---|---|")

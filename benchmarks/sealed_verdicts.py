@@ -1,9 +1,9 @@
 """Diagnose cases with unknown keys, and collect the verdicts in one file.
 
-A case is a folder with `rig.txt`, one word, and one CSV a record; a rig is a file of
-`docs/rigs`, or of `--rigs` for a cam-follower. Every verdict is stored immediately, so
-several of these commands may share the work, and a stopped one can be resumed. The last
-one writes the file.
+A case is a folder with `rig.txt`, which contains one word, and one CSV file per record;
+the word names a file in `docs/rigs` or, for a cam-follower, in the `--rigs` folder.
+Every verdict is stored immediately, so several of these commands may share the work,
+and an interrupted one can be resumed. The last one writes the file.
 
     python -m benchmarks.sealed_verdicts CASES --rigs RIGS --keep KEPT --out set2.json
 """
@@ -21,7 +21,7 @@ from jaxcam.recordings import read_case, read_rig
 
 
 def verdict_of(case: Path, rigs: Path) -> dict:
-    """The verdict on a case, with the seconds that it took."""
+    """The verdict on a case, and the seconds it took."""
     name, begun = (case / "rig.txt").read_text().strip(), time.time()
     if name == "cam_follower":
         rig = read_rig(rigs / f"{name}.toml")
@@ -45,7 +45,7 @@ def main() -> None:
     for case in cases:
         file = args.keep / f"{case.name}.json"
         try:
-            # another command may be at it
+            # another command may be working on it
             (args.keep / f"{case.name}.begun").touch(exist_ok=False)
         except FileExistsError:
             continue

@@ -1,9 +1,9 @@
 """Compare the speed of the event loop with scalar numba loops and scipy.
 
-    python -m benchmarks.speed            # all parts, a table each
+    python -m benchmarks.speed # all parts, one table each
 
 One pinned core, minimum CPU time of interleaved runs, tolerance 1e-9 on every side,
-float64. Needs `pip install -e ".[bench]"`.
+float64. Requires `pip install -e ".[bench]"`.
 """
 
 import subprocess
@@ -43,7 +43,7 @@ def ours(workload, block: int, settings=FAST):
 
 
 def batches(repeats: int, side: int) -> None:
-    """W1 and W2 with every program, and the agreement of the samples."""
+    """Run W1 and W2 with every program, and compare the samples."""
     for workload, block in (
         (_workloads.sweep(), 64),
         (_workloads.grid(side=side), 256),
@@ -79,7 +79,9 @@ def batches(repeats: int, side: int) -> None:
 
 
 def single(repeats: int) -> None:
-    """One trajectory of 300 turns, and its Jacobian in six parameters."""
+    """Time one trajectory of 300 turns, and a Jacobian with respect to six
+    parameters.
+    """
     workload = _workloads.single()
     system = CamFollower(speed=workload.speed[0])
     t1 = workload.turns * float(system.period)
@@ -142,7 +144,7 @@ print(f"{{time.perf_counter() - started:.2f}}")
 
 
 def first_call() -> None:
-    """Seconds from `simulate` to its result, cold and with a warm disk cache."""
+    """Time the first call of `simulate` with a cold and a warm disk cache."""
     with tempfile.TemporaryDirectory() as cache:
         script = _FIRST_CALL.format(cache=cache)
         spent = [

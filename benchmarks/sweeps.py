@@ -3,10 +3,10 @@
     python -m benchmarks.sweeps                      # all parts
     python -m benchmarks.sweeps --side 64 --largest 10000 --no-cluster
 
-The two workloads of `benchmarks.speed`. The bare loop is `stroboscope`, one call for
-all lanes; the sweep samples, labels, finds the attractors and stores to disk. One
-pinned core and minimum CPU time of interleaved runs, but for the parts on two cores,
-which are wall time; tolerance 1e-9 on both sides.
+The two workloads are those of `benchmarks.speed`. The bare loop is `stroboscope`, one
+call for all trajectories; the sweep also labels motions, finds the attractors and
+writes to disk. One pinned core, minimum CPU time of interleaved runs (wall time for the
+parts on two cores), tolerance 1e-9 on both sides.
 """
 
 import os
@@ -19,7 +19,7 @@ from pathlib import Path
 from benchmarks import _timing
 
 
-# not where another process of these benchmarks imports this module
+# not when another process of these benchmarks imports this module
 CORE = _timing.pin() if __name__ == "__main__" else None
 
 import equinox as eqx
@@ -36,13 +36,13 @@ from jaxcam.sweeps import basins, diagram, Grid
 
 
 def rig() -> CamFollower:
-    """Table 4.4 at 145 rpm."""
+    """The rig of Table 4.4 at 145 rpm."""
     speed = jnp.asarray(rpm_to_rad_s(145.0), dtype=float)
     return eqx.tree_at(lambda s: s.speed, CamFollower(), speed)
 
 
 def states_at_145(side: int) -> Grid:
-    """The states of workload W2 as cells of a grid."""
+    """The states of workload W2 as grid cells."""
     low = _workloads.contact_angle(0.0) + 0.001
     return Grid((low, -3.0), (low + 0.249, 3.0), (side, side))
 
@@ -58,7 +58,7 @@ def swept_to(work):
 
 
 def kept(repeats: int, side: int) -> None:
-    """Relative speed of the sweep, and the number of wasted steps."""
+    """Print the relative speed of the sweep and the share of wasted steps."""
     system, grid, turns = rig(), states_at_145(side), 30
     states, lanes = grid.states(), side * side
     sweep = _workloads.sweep()
@@ -103,7 +103,7 @@ def kept(repeats: int, side: int) -> None:
 
 
 def idle_slots(call) -> float:
-    """Part of the attempts that the compiled loop made without a lane in the slot."""
+    """Share of the attempts that the compiled loop made in empty slots."""
     slots, steps, compiled = [], [], _refilled_lanes.compiled_chunk
 
     def counted(start, *others):
@@ -170,10 +170,11 @@ if __name__ == "__main__":
 
 
 def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
-    """Wall time on one core and on two, in a process that is not pinned.
+    """Compare wall times on one and two cores, in a process that is not pinned.
 
-    XLA makes as many threads as it finds cores when it starts. The first line is the
-    speed-up of the machine itself; each pair of runs is in brackets.
+    XLA creates as many threads as it finds cores when it starts. The first line is the
+    speed-up of the machine itself; the ratios of the single pairs of runs are in
+    brackets.
     """
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "two_cores.py"
@@ -207,7 +208,9 @@ print(side * side, time.perf_counter() - started, before, peak() - before)
 
 
 def scale(largest: int) -> None:
-    """Time and memory against the number of initial states, each in a new process."""
+    """Print time and memory against the number of initial states, each in a new
+    process.
+    """
     print("\n   states        s  us a turn  peak before (MB)  and beyond (MB)")
     lanes = 10_000
     while lanes <= largest:

@@ -1,11 +1,12 @@
-"""Effects without a name in rigs of a user's own: are they modelled?
+"""Test whether effects without a name are modelled in user-defined rigs.
 
-Rigs of `docs/rigs` are drawn at random within their tolerances, with one effect of
-`_hidden_physics.py` in each, simulated by code that shares nothing with ours, recorded
-through noisy sensors, and diagnosed. A verdict is right if it states kind and arguments
-of what was hidden and names nothing beside it, if nine tenths of the squared error on
-unseen data above the noise are gone, and if the function is off by less than four
-tenths of its rms where the rig was, apart from what parameters of the rig can do.
+The rigs in `docs/rigs` are drawn at random within their tolerances, each with one
+effect from `_hidden_physics.py`, simulated by independent code, recorded through noisy
+sensors, and diagnosed. A verdict is correct if it gives the kind and arguments of the
+hidden effect and names nothing else, if it removes nine tenths of the squared error
+above the noise on held-out data, and if, where the rig moved, the error of the function
+is less than four tenths of the rms of the hidden effect, apart from what the rig
+parameters can represent.
 
     python -m benchmarks.unnamed two_stops
     python -m benchmarks.unnamed pendulum_wall --effects stop magnet --first 5
@@ -26,11 +27,11 @@ from jaxcam.fitting import read_setup
 
 
 _DURATION = 6.0
-# An effect acts in more than this share of the samples or impacts
+# An effect must act in more than this share of the samples or impacts
 _SEEN = 0.05
-# Rigs in which an effect is tried
+# Maximum number of rigs in which an effect is tried
 _DRAWS = 40
-_AT_IMPACTS = ("restitution", "surface")  # kinds that are of a constraint
+_AT_IMPACTS = ("restitution", "surface")  # kinds that belong to a constraint
 
 
 def scales_of(setup, motions: list[Motion]) -> Scales:
@@ -54,9 +55,9 @@ def scales_of(setup, motions: list[Motion]) -> Scales:
 def hidden_case(name: str, setup, effect: str, seed: int):
     """An effect of random size in a rig drawn at random, and its recordings.
 
-    Rigs in which the effect hardly ever acts are drawn again.
+    Rigs in which the effect hardly ever acts are redrawn.
 
-    **Returns:** the effect, recordings, the motions they show, and the rig.
+    **Returns:** the effect, the recordings, the underlying motions, and the rig.
 
     **Raises:** `ValueError` if the effect acts in none of many rigs.
     """
@@ -87,7 +88,9 @@ def _share_acting(hidden: Hidden, motions: list[Motion]) -> float:
 
 
 def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
-    """RMS error of a function by the rms of what was hidden, where the rig was."""
+    """RMS error of a function relative to the rms of the hidden effect, where the rig
+    moved.
+    """
     places, true, known = _along(hidden, motions)
     places["phase"] = np.mod(places["phase"], 2 * np.pi)
     table = RegularGridInterpolator(
@@ -105,7 +108,9 @@ def function_off(found, hidden: Hidden, motions: list[Motion]) -> float:
 
 
 def _along(hidden: Hidden, motions: list[Motion]):
-    """Arguments and values of an effect along the motions, and what a rig may do."""
+    """Arguments and values of an effect along the motions, and the part a rig may
+    represent.
+    """
     if hidden.effect.kind in _AT_IMPACTS:
         rows = np.concatenate([one.struck for one in motions])
         time, speed, angle = rows.T
@@ -125,7 +130,7 @@ def _along(hidden: Hidden, motions: list[Motion]):
 
 
 def judged(found: Diagnosis, hidden: Hidden, motions) -> tuple[bool, str]:
-    """Whether a verdict is right, and why."""
+    """Whether a verdict is correct, and why."""
     effect = hidden.effect
     named = [one.name for one in found.effects]
     alike = [
@@ -157,8 +162,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rig", choices=sorted(MAKERS))
     parser.add_argument("--effects", nargs="*", choices=sorted(EFFECTS))
-    parser.add_argument("--first", type=int, default=0, help="seed of the first case")
-    parser.add_argument("--cases", type=int, default=1, help="of each effect")
+    parser.add_argument("--first", type=int, default=0, help="seed of first case")
+    parser.add_argument("--cases", type=int, default=1, help="cases per effect")
     parser.add_argument("--elements", type=int, default=Policy().elements)
     args = parser.parse_args()
     policy = Policy(elements=args.elements)

@@ -77,7 +77,7 @@ def test_restitution_of_a_model(make, r):
 
 
 def test_restitution_of_one_lane_among_many():
-    with pytest.raises(ValueError, match=r"it is 1\.5 in lane 1\."):
+    with pytest.raises(ValueError, match=r"it is 1\.5 in trajectory 1\."):
         hybrid.stroboscope(Table(), STATE, 3, where=lambda s: s.r, values=[0.5, 1.5])
 
 

@@ -365,7 +365,7 @@ def test_periodic_planar_system():
 
 def test_theorem_2_2_says_what_it_needs():
     eye = np.eye(2)
-    with pytest.raises(ValueError, match="continuously"):
+    with pytest.raises(ValueError, match="continuous"):
         planar_stability(PiecewiseLinear(-eye, -2 * eye, [1.0, 0.0]))
     with pytest.raises(ValueError, match="observable"):
         planar_stability(PiecewiseLinear(-eye, -eye, [1.0, 0.0]))

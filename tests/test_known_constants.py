@@ -194,7 +194,7 @@ def test_what_a_recording_says_wrongly(tmp_path):
         dataclasses.replace(run, constants={"mass": mass})
         for run, mass in zip(recorded(), (0.3, np.inf, 0.5))
     )
-    with pytest.raises(RecordingError, match="run2: its constant `mass`"):
+    with pytest.raises(RecordingError, match="run2: the constant `mass`"):
         setup.problem([first, second])
     run = dataclasses.replace(recorded()[0], constants={"stiffness": 3.0})
     with pytest.raises(ValueError, match="called 'stiffness'"):

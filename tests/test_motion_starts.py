@@ -79,7 +79,7 @@ def test_batches_of_sweeps_refuse_by_the_same_rule():
     """A far lane does not loosen the check of the others."""
     good = np.array([[1e3, 0.0], [-9e-13, 0.0]])
     assert np.all(stroboscope(_BALL, good, 1, period=0.1).code == FINISHED)
-    with pytest.raises(ValueError, match="gap is negative .* in lane 1"):
+    with pytest.raises(ValueError, match="gap is negative .* in trajectory 1"):
         stroboscope(_BALL, np.array([[1e3, 0.0], [-1e-10, 0.0]]), 1, period=0.1)
 
 

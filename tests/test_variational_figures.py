@@ -36,7 +36,7 @@ def test_exponents_settle_in_a_band():
     assert len(figure.axes[0].patches) == 2
     plt.close(figure)
     lanes = SimpleNamespace(running=running[None])
-    with pytest.raises(ValueError, match="lanes"):
+    with pytest.raises(ValueError, match="batch"):
         plotting.lyapunov_convergence(lanes)
 
 

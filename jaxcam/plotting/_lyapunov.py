@@ -34,8 +34,8 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
     running = np.asarray(spectrum.running)
     if running.ndim != 2:
         raise ValueError(
-            f"this spectrum has {running.shape[0]} motions; pass one of them, such as "
-            "jax.tree.map(lambda a: a[0], spectrum)"
+            f"this spectrum is of a batch of {running.shape[0]}; pass a single motion, "
+            "such as jax.tree.map(lambda a: a[0], spectrum)"
         )
     ax = one_axes(ax)
     time = float(spectrum.turn) * np.arange(1, len(running) + 1)
