@@ -10,7 +10,12 @@ from switched_systems import bilinear_motion, integrated, random_affine
 
 import jaxcam
 from jaxcam.hybrid import flow, RESULTS, Settings, stroboscope, SwitchedSystem
-from jaxcam.models import BilinearOscillator, GearBacklash
+from jaxcam.models import (
+    BilinearOscillator,
+    GearBacklash,
+    load_system,
+    save_system,
+)
 
 
 SHARP = Settings(tolerance=1e-13)
@@ -286,3 +291,9 @@ def test_bad_functions_of_surfaces_are_refused():
             jaxcam.simulate(system, [0.5, 0.0], 0.0, 1.0)
     with pytest.raises(ValueError, match="switching surfaces"):
         jaxcam.simulate(Relay(), [0.5, 0.0], 0.0, 1.0, engine="diffeqsolve")
+
+
+def test_models_are_saved_and_read(tmp_path):
+    for system in (BilinearOscillator(stiffness=3.0), GearBacklash(load=0.2)):
+        save_system(system, tmp_path / "system.json")
+        assert eqx.tree_equal(load_system(tmp_path / "system.json"), system)

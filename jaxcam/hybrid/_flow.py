@@ -115,10 +115,9 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     start = (jnp.asarray(0, jnp.int32), (carried, kept))
     loop = functools.partial(jax.lax.while_loop, unfinished, several)
     _, (carried, kept) = one_kernel(loop, on=not settings.plain)(start)
-    contact = jnp.stack(carried.mode)
     return Arrival(
         state=jnp.stack(carried.x),
-        contact=contact[: functions.m] if functions.k else contact,
+        contact=jnp.stack(carried.contact) if functions.m else jnp.zeros(0, bool),
         impacts=carried.impacts,
         steps=depend_on(carried.steps, kept),
         code=carried.status.astype(jnp.int32),

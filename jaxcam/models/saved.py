@@ -22,8 +22,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..hybrid import HybridSystem
+from ._bilinear_oscillator import BilinearOscillator
 from ._bouncing_ball import BouncingBall
 from ._cam_follower import CamFollower
+from ._gear_backlash import GearBacklash
 from ._impact_oscillator import ImpactOscillator
 from ._restitution import ConstantRestitution, LinearInSpeed, PowerLawRestitution
 from ._triple_integrator import TripleIntegrator
@@ -35,11 +37,13 @@ _LARGEST = 1e300
 _MISFITS = (TypeError, AttributeError, LookupError, ArithmeticError, RecursionError)
 _MISFIT = "the fields of `{}` do not fit together; save the system again."
 _KNOWN: tuple[type, ...] = (
+    BilinearOscillator,
     BouncingBall,
     CamFollower,
     ConstantRestitution,
     EccentricCircle,
     FourierProfile,
+    GearBacklash,
     ImpactOscillator,
     LinearInSpeed,
     PiecewiseProfile,
