@@ -15,12 +15,12 @@ from ._lock import hold
 
 
 class Output:
-    """Terminal, `--json FILE` and `--out DIR` of one command.
+    """The outputs of one command: the terminal, `--json FILE` and `--out DIR`.
 
     Unwritable paths are reported before the work begins.
 
     Raises:
-        ValueError: A path has the wrong kind.
+        ValueError: A path is of the wrong kind.
         OSError: A path cannot be written.
     """
 

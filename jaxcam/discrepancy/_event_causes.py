@@ -1,4 +1,4 @@
-"""Find the physics that would move predicted event speeds to the observed ones.
+"""Find the physics that would shift the predicted event speeds to the observed ones.
 
 No recordings are needed, only the bifurcation speeds of a rig. The strength of each
 term and one parameter of the rig are fitted to these speeds.

@@ -66,8 +66,7 @@ def equivalent_control(
 
     It solves H_t + H_x (f + g u) = 0 and is in [-1, 1] if the system slides. Because
     the control enters linearly, the resulting field is that of Filippov. It is also the
-    dry-friction force divided by its maximum, or the mean of a relay (V. I. Utkin's
-    method of equivalent control).
+    dry-friction force divided by its maximum, or the mean output of a relay.
 
     Args:
         system: The system.

@@ -117,7 +117,7 @@ def stroboscope(
         A `Stroboscope` of NumPy arrays.
 
     Raises:
-        ValueError: Shapes do not fit, or there is no period.
+        ValueError: Shapes do not match, or there is no period.
 
     Examples:
         >>> from jaxcam.hybrid import stroboscope

@@ -17,7 +17,7 @@ class PiecewiseLinear(FilippovSystem):
     """Piecewise-linear system: `x' = A- x` for c x <= 0 and `x' = A+ x` for c x >= 0.
 
     If the field is continuous, that is, A+ - A- = k c for some vector k, there is no
-    sliding; otherwise there is in general (thesis, eq. 2.44).
+    sliding; otherwise there generally is (thesis, eq. 2.44).
 
     Examples:
         >>> from jaxcam.models import PiecewiseLinear

@@ -17,9 +17,9 @@ _POINTS = 200
 def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
     """Draw lift, velocity, acceleration and jerk, per radian of the cam.
 
-    At a jump of a derivative, the curve is broken, and the values on both sides are
-    connected by a dashed line. The infinite pulse that results from a jump of the next
-    lower derivative is not drawn.
+    Where a derivative jumps, its curve is broken, and the values on the two sides are
+    connected by a dashed line. The infinite pulse of the next higher derivative is not
+    drawn.
 
     Args:
         program: The motion program.

@@ -2,7 +2,7 @@
 
 
 class RecordingError(ValueError):
-    """A file cannot be used as a recording; one sentence says what to do.
+    """A file cannot be used as a recording; the message says what to do.
 
     Examples:
         >>> from jaxcam.recordings import RecordingError, read_recording

@@ -75,7 +75,8 @@ class LocalMap(eqx.Module):
 
 
 def fit_local_map(lobes: Lobes) -> LocalMap:
-    """Fit the scales by lines through logarithms, and one lobe (thesis, eqs. 5.2-5.5).
+    """Fit the scales by lines through the logarithms, and fit one lobe (thesis, eqs.
+    5.2-5.5).
 
     The cubic with a square root (thesis, eq. 5.3) passes through both ends of the first
     lobe and matches the sampled slope at its points of slope 1, 0 and -1; a slope that

@@ -1,4 +1,4 @@
-"""Stop a fit that makes little progress far from the data, or is late.
+"""Stop a fit that makes little progress far from the data, or is too slow.
 
 Without the right term, a fit may take very many small steps along a valley of the cost;
 with the right term, it needs a few large steps.
@@ -18,9 +18,9 @@ def given_up(
 ) -> Callable[[Sequence[float]], bool]:
     """Return the callback by which `jaxcam.fitting.fit` is stopped.
 
-    A fit is late if its cost is not below a given one after a number of attempts. It
-    crawls if it explains little and its last steps took many attempts and gained very
-    little.
+    A fit is late if its cost is still above a given value after a number of attempts.
+    It crawls if it explains little and its last steps took many attempts and gained
+    very little.
 
     **Arguments:** the number of samples; the policy; the cost that a fit must fall
     below; and the cost below which a crawling fit is not stopped, because its value

@@ -27,7 +27,7 @@ _EARLY = 0.1
 
 
 def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
-    """Return at which of 720 phases of the turn a hidden flight is possible.
+    """Return the phases, out of 720 per turn, at which a hidden flight is possible.
 
     They extend from the phase at which the contact acceleration, minus three standard
     deviations due to the tolerances, allows a release, to the phase at which the

@@ -60,8 +60,7 @@ def read_recordings(
         A tuple of `Recording`, one for each run and piece.
 
     Raises:
-        RecordingError: The file cannot be used; the message is one sentence with the
-            fix.
+        RecordingError: The file cannot be used; the message says how to fix it.
     """
     file = Path(file)
     chosen = read_columns(
@@ -116,8 +115,7 @@ def read_recording(
         A [`jaxcam.recordings.Recording`][].
 
     Raises:
-        RecordingError: The file cannot be used; the message is one sentence with the
-            fix.
+        RecordingError: The file cannot be used; the message says how to fix it.
 
     Examples:
         >>> from pathlib import Path
@@ -162,7 +160,7 @@ def read_case(
         A case.
 
     Raises:
-        RecordingError: A file cannot be used; the message is one sentence with the fix.
+        RecordingError: A file cannot be used; the message says how to fix it.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG
