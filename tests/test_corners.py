@@ -69,7 +69,7 @@ def test_what_does_not_depend_on_the_motion_is_no_corner():
 
     class ByNumber(Ball):
         def force(self, t, state):
-            return (state[1] > 0) * 0.5
+            return (state[1] > 0).astype(float) * 0.5
 
     assert corners(Parameter(), [1.0, 0.0]) == []
     assert [c.operation for c in corners(ByNumber(), [1.0, 0.0])] == ["where"]
