@@ -159,7 +159,7 @@ def test_parameter_that_is_not_a_number():
 
 
 def test_unknown_preset():
-    with pytest.raises(ValueError, match="\"table-4.4\".*'table-4.5' is none of them"):
+    with pytest.raises(ValueError, match="\"table-4.4\".*, not 'table-4.5'"):
         preset("table-4.5")
 
 

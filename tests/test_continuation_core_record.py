@@ -200,7 +200,7 @@ def test_a_lane_that_cannot_start_spoils_nothing():
         CUSP, [[np.nan], cusp_start(-1.0)], a, (-3.0, 3.0), direction=-1, points=5
     )
     assert batch.count.tolist() == [0, 5]
-    assert "no solution" in batch.reasons[0]
+    assert "not a solution" in batch.reasons[0]
     assert "requested number" in batch.reasons[1]
     with pytest.raises(ValueError, match="3 values for 2 branches"):
         continuation.follow_batch(

@@ -51,7 +51,13 @@ _LIBRARIES = tuple(f"/site-packages/{name}/" for name in ("jax", "jaxlib", "equi
 
 @dataclasses.dataclass(frozen=True)
 class Corner:
-    """A place where a function of a system is not smooth in time or state."""
+    """A place where a function of a system is not smooth in time or state.
+
+    Examples:
+        >>> from jaxcam.hybrid import Corner
+        >>> print(Corner("gap", "abs", "", 0).operation)
+        abs
+    """
 
     function: str
     """Method of the system: `"vector_field"` (or `"branch"`), `"gap"`, ..."""
