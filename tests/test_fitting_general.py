@@ -307,7 +307,7 @@ def test_refusals(balls):
     with pytest.raises(ValueError, match="same number"):
         fitting.Problem.build(model, balls.segments, [*PARAMETERS, same])
     whole = fitting.Parameter("all", lambda m: m.system)
-    with pytest.raises(ValueError, match="not one number"):
+    with pytest.raises(ValueError, match="not a single number"):
         fitting.Problem.build(model, balls.segments, [whole])
     with pytest.raises(ValueError, match="positive"):
         fitting.Parameter("g", lambda m: m.system.gravity, tolerance=0.0)

@@ -111,7 +111,7 @@ def test_a_fit_knows_what_each_record_was(tmp_path):
         assert (float(system.mass), float(system.speed)) == (mass, speed)
     with pytest.raises(ValueError, match="known for each record"):
         fit(problem, free=["mass"])
-    with pytest.raises(ValueError, match="all recordings share"):
+    with pytest.raises(ValueError, match="shared by all recordings"):
         train(problem, lambda model: model.system.stiffness)
 
 

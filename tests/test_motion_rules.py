@@ -90,7 +90,7 @@ def test_two_constraints_are_hit_together(unit, before, together):
 def test_hidden_hops_are_counted_at_impacts_that_happen(good, lands, hidden, hops):
     carried = SimpleNamespace(struck=(1.0, 2.0), crowded=(3.0,))
     attempt = SimpleNamespace(
-        good=good, lands=lands, hidden=hidden, hit=[lands, False], t=5.0
+        good=good, lands=lands, strikes=lands, hidden=hidden, hit=[lands, False], t=5.0
     )
     struck, (crowded,) = _struck(carried, attempt)
     assert [float(t) for t in struck] == [5.0 if good and lands else 1.0, 2.0]

@@ -90,7 +90,7 @@ def test_basins_of_the_oscillator(tmp_path):
         ("diagram bouncing-ball --from 1 --to 2", "gravity, restitution"),
         ("basins pendulum", "cam-follower, impact-oscillator"),
         ("basins bouncing-ball", "give its corners"),
-        ("basins --shape 4", "one of each"),
+        ("basins --shape 4", "one in each"),
         ("basins --shape 4.5,3", "whole numbers"),
         ("diagram --from 130 --to 140 --dwell 60", "such as 60,10"),
         ("basins --shape 4,0", "1 or more"),

@@ -120,7 +120,7 @@ def test_random_starts_show_what_one_start_hides():
     ("options", "word"),
     [
         ({"direction": "sideways"}, "each, up, down, both"),
-        ({"keep": 50}, "keep is 50 and turns 40"),
+        ({"keep": 50}, "keep is 50 and turns is 40"),
         ({"where": "size"}, "omega, restitution"),
         ({"where": ("omega", "wall")}, "use chart"),
         ({"values": [[2.6, 2.7]]}, "give a vector"),

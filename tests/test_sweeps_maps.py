@@ -134,7 +134,7 @@ def test_random_starts_do_not_depend_on_how_many_follow():
 @pytest.mark.parametrize(
     ("grid", "word"),
     [
-        (((0,), (1, 2), (3,)), "one of each"),
+        (((0,), (1, 2), (3,)), "one in each"),
         (((0,), (np.inf,), (3,)), "finite"),
         (((1,), (0,), (3,)), "low below high"),
         (((0,), (1,), (0,)), "1 or"),
