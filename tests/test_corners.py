@@ -75,4 +75,7 @@ def test_what_does_not_depend_on_the_motion_is_no_corner():
     assert [c.operation for c in corners(ByNumber(), [1.0, 0.0])] == ["where"]
     assert corners(ImpactOscillator(), [0.0, 0.0]) == []
     assert corners(BilinearOscillator(), [0.0, 0.0]) == []
-    assert isinstance(jaxcam.hybrid.Corner("gap", "abs", "", 0).__str__(), str)
+
+
+def test_a_corner_of_unknown_origin_names_no_line():
+    assert str(jaxcam.hybrid.Corner("gap", "abs", "", 0)).startswith("`abs` in `gap`")

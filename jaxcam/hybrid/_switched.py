@@ -1,7 +1,7 @@
 """Define a system whose vector field has several branches, joined at surfaces."""
 
 import abc
-from typing import Any, ClassVar
+from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -40,9 +40,6 @@ class SwitchedSystem(HybridSystem):
         >>> np.asarray(run.switches.time).round(6).tolist()
         [1.047198]
     """
-
-    surface_names: ClassVar[tuple[str, ...]] = ()
-    """Names of the switching surfaces, in the order of `switching`."""
 
     @abc.abstractmethod
     def switching(
@@ -133,8 +130,3 @@ class SwitchedSystem(HybridSystem):
         del sides
         shape = jnp.shape(self.switching(t, state))
         return jnp.broadcast_to(state, (*shape, *state.shape))
-
-    def surface_name(self, number: int) -> str:
-        """Return the name of a surface, by default `surface 1` and so on."""
-        names = self.surface_names
-        return names[number] if number < len(names) else f"surface {number}"

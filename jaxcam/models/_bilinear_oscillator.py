@@ -39,8 +39,6 @@ class BilinearOscillator(SwitchedSystem):
     """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
     """Units of the state's components."""
-    surface_names: ClassVar[tuple[str, ...]] = ("stop",)
-    """Name of the switching surface."""
 
     stiffness: jax.Array = parameter(4.0)
     """Stiffness beyond the stop; before it the stiffness is one."""

@@ -44,8 +44,6 @@ class GearBacklash(SwitchedSystem):
     """Names of the state's components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
     """Units of the state's components."""
-    surface_names: ClassVar[tuple[str, ...]] = ("driving flank", "back flank")
-    """Names of the switching surfaces."""
 
     clearance: jax.Array = parameter(1.0)
     """Half the backlash."""

@@ -177,9 +177,9 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     for rival in choice.rivals:
         if rival.share > 1 - policy.sure:
             yield functions_tie(rival_name(rival), rival)
-    for _, share in missing.decoys:
-        if share > policy.decoy:
-            yield decoy_explains(share)
+    share = max((share for _, share in missing.decoys), default=0.0)
+    if share > policy.decoy:
+        yield decoy_explains(share)
     if left > policy.as_noise:
         yield functions_fall_short(left)
     elif held.after > policy.as_noise:

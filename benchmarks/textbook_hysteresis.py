@@ -1,0 +1,94 @@
+"""How much of a Bouc-Wen force can the hysteresis of the library represent?
+
+Along the true motion of `_textbook_cases.py`, the internal state of a hysteresis is
+integrated for a grid of parameters, and its force is fitted together with a constant, a
+stiffness and a damping. Printed is what remains of the force that no linear oscillator
+has, as a share of its rms: for the parameters that the element allows, and for loading
+and unloading coefficients of any sign.
+
+    python -m benchmarks.textbook_hysteresis bouc_wen
+"""
+
+import argparse
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from benchmarks._textbook_cases import CASES, extra_force, moved, multisine
+
+
+# Points of the motion per sample
+_FINE = 4
+
+
+def states(deflection, loading, unloading, power) -> np.ndarray:
+    """Internal states `(n, k)` in the second period of a deflection.
+
+    The rate is that of the deflection times `1 - c |z|^power`, with the coefficient c
+    of loading or of unloading.
+    """
+    change = np.diff(np.concatenate([deflection, deflection]))
+    z, found = np.zeros(len(loading)), []
+
+    def slope(z, step):
+        c = np.where(z * np.sign(step) > 0, loading, unloading)
+        return 1 - c * np.maximum(np.abs(z), 1e-12) ** power
+
+    for step in change:
+        middle = z + step / 2 * slope(z, step)
+        z = np.clip(z + step * slope(middle, step), -50, 50)
+        found.append(z)
+    return np.array(found[len(deflection) - 1 :])
+
+
+def remaining(case, motion, loading, unloading, power) -> np.ndarray:
+    """Rms of the force that remains, as a share of that of the extra force."""
+    x, v = motion.states[:, 0], motion.states[:, 1]
+    force = case.force(x, v, motion.states[:, 2])
+    count = _FINE * (len(x) - 1) + 1
+    fine = np.linspace(motion.time[0], motion.time[-1], count)
+    path = CubicHermiteSpline(motion.time, x, v)(fine) / np.max(np.abs(x))
+    every = states(path, loading, unloading, power)[::_FINE]
+    size = np.std(extra_force(case, motion))
+    left = []
+    for z in every.T:
+        basis = np.stack([z, np.ones(len(x)), x, v], axis=1)
+        basis = basis / np.linalg.norm(basis, axis=0)
+        found = basis @ np.linalg.lstsq(basis, force, rcond=None)[0]
+        left.append(np.std(force - found) / size)
+    return np.array(left)
+
+
+def _grid(*axes) -> np.ndarray:
+    return np.array(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    names = [name for name, case in CASES.items() if case.memory is not None]
+    parser.add_argument("case", choices=names)
+    parser.add_argument("--seed", type=int, default=1, help="of the input")
+    args = parser.parse_args()
+    case, rng = CASES[args.case], np.random.default_rng(args.seed)
+    motion = moved(case, multisine(case, 1.0, rng))
+    limits, d, n = np.geomspace(0.05, 20, 14), np.linspace(0.5, 1.5, 5), (0.5, 1.0, 2.0)
+    limit, d, n = _grid(limits, d, n)
+    loading = limit**-n
+    left = remaining(case, motion, loading, (1 - 2 * d) * loading, n)
+    k = int(np.argmin(left))
+    print(
+        f"{args.case}: the element leaves {left[k]:.3f} of the force at best "
+        f"(limit {limit[k]:.3g}, d {d[k]:g}, n {n[k]:g})"
+    )
+    coefficients = np.linspace(-4, 4, 33)
+    loading, unloading, n = _grid(coefficients, coefficients, (1.0,))
+    left = remaining(case, motion, loading, unloading, n)
+    k = int(np.argmin(left))
+    print(
+        f"  coefficients of any sign leave {left[k]:.3f} "
+        f"(loading {loading[k]:g}, unloading {unloading[k]:g}, n 1)"
+    )
+
+
+if __name__ == "__main__":
+    main()
