@@ -43,7 +43,7 @@ from jaxcam.hybrid.lowering._materialise import without_library
 from jaxcam.hybrid.lowering._packing import pack
 from jaxcam.hybrid.lowering._sincos import sincos
 from jaxcam.hybrid.runge_kutta import step, tableau_of
-from jaxcam.hybrid.surface._normal import _solve_masked
+from jaxcam.hybrid.surface._normal import solve_masked
 from jaxcam.models import BouncingBall
 
 
@@ -390,7 +390,7 @@ def test_equations_of_the_constraints_in_contact(mask):
     right, held = draw.normal(size=3), np.flatnonzero(mask)
     exact = np.zeros(3)
     exact[held] = np.linalg.solve(matrix[np.ix_(held, held)], right[held])
-    found = _solve_masked(jnp.asarray(matrix), jnp.asarray(right), jnp.asarray(mask))
+    found = solve_masked(jnp.asarray(matrix), jnp.asarray(right), jnp.asarray(mask))
     np.testing.assert_allclose(found, exact, atol=1e-13)
 
 

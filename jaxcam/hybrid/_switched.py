@@ -89,7 +89,8 @@ class SwitchedSystem(HybridSystem):
         """Return the sides on which a motion from this state starts.
 
         By default the signs of the switching functions. A start on a surface takes the
-        side that the motion enters. With hysteresis the state may allow both: override
+        side that the motion enters, or slides; where both branches leave the surface,
+        the motion is not unique, and the side is the one that this returns. With hysteresis the state may allow both: override
         this, for example with a field of the system.
 
         Args:
@@ -111,6 +112,15 @@ class SwitchedSystem(HybridSystem):
         it rises to +hysteresis, as a relay does.
         """
         return 0.0
+
+    @property
+    def holding(self) -> Any:
+        """Return the limit of the force that holds a sliding motion on a surface.
+
+        It is relative to that of the branches, at least one: a number, or shape `(k,)`;
+        one by default. For dry friction it is the ratio of static to kinetic friction.
+        """
+        return 1.0
 
     def reset(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]

@@ -100,16 +100,21 @@ def check_system(system, t0, state) -> None:
     if signature not in _WELL_SHAPED:
         _check_shapes(system, t0, state)
     system.check()
-    if isinstance(system, SwitchedSystem) and not np.all(
-        np.asarray(system.hysteresis) >= 0
-    ):
-        raise ValueError(f"hysteresis is {system.hysteresis}; it cannot be negative")
+    if isinstance(system, SwitchedSystem):
+        _check_switches(system)
     check_restitution(system, _restitutions(system, t0, state))
     if signature is not None:
         _WELL_SHAPED.add(signature)
         if len(_SOUND) >= _MANY:
             _SOUND.clear()
         _SOUND.add(numbers)
+
+
+def _check_switches(system: SwitchedSystem) -> None:
+    if not np.all(np.asarray(system.hysteresis) >= 0):
+        raise ValueError(f"hysteresis is {system.hysteresis}; it cannot be negative")
+    if not np.all(np.asarray(system.holding) >= 1):
+        raise ValueError(f"holding is {system.holding}; it must be at least one")
 
 
 def _digest(system) -> bytes:
@@ -195,11 +200,13 @@ def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
             f"and the state {(n,)}; return shape {(*switch.shape, n)}, one row for "
             "each surface"
         )
-    if np.shape(system.hysteresis) not in ((), (k,)):
-        raise ValueError(
-            f"hysteresis has shape {np.shape(system.hysteresis)}; give a number, or "
-            f"one for each of the {k} surfaces"
-        )
+    for name in ("hysteresis", "holding"):
+        given = np.shape(getattr(system, name))
+        if given not in ((), (k,)):
+            raise ValueError(
+                f"{name} has shape {given}; give a number, or one for each of the {k} "
+                "surfaces"
+            )
     return {"switching": switch, "sides": sides, "reset": after}
 
 

@@ -17,8 +17,10 @@ class RowKind(enum.IntEnum):
     CONTACT = 4
     RELEASE = 5
     STOP = 6
-    # the crossing of a switching surface
+    # the crossing of a switching surface, and the begin and end of sliding along it
     SWITCH = 7
+    SLIDE = 8
+    LEAVE = 9
 
 
 class _ByCode(type(eqx.Enumeration)):
@@ -69,12 +71,12 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
         "constraint comes to rest before impacts on the next begin."
     )
     """Impacts on several constraints accumulate together."""
-    slides = (
-        "The motion slides along a switching surface, or its crossings accumulate: "
-        "both branches of the vector field point to the surface. State it as a "
-        "jaxcam.filippov.FilippovSystem, which slides, or give the switch a hysteresis."
+    accumulates = (
+        "Crossings of a switching surface accumulate: each flight off the surface is "
+        "shorter than the last. Choose t1 before this time, or give the switch a "
+        "hysteresis."
     )
-    """The motion slides along a switching surface."""
+    """Crossings of a switching surface accumulate."""
 
 
 _ITEMS = (
@@ -85,7 +87,7 @@ _ITEMS = (
     RESULTS.behind,
     RESULTS.backward,
     RESULTS.together,
-    RESULTS.slides,
+    RESULTS.accumulates,
 )
 (
     FINISHED,
@@ -95,7 +97,7 @@ _ITEMS = (
     BEHIND,
     BACKWARD,
     TOGETHER,
-    SLIDES,
+    ACCUMULATES,
 ) = map(float, range(len(_ITEMS)))
 """Codes: the index of each item above. The status of a batch element is one of them."""
 

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from ..breakpoints import declared
-from ..codes import FINISHED, NOT_FINITE, RUNNING, SLIDES, STEP_FAILED, TOGETHER
+from ..codes import ACCUMULATES, FINISHED, NOT_FINITE, RUNNING, STEP_FAILED, TOGETHER
 from ..runge_kutta import Tableau, tableau_of
 from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
 from ._loop_state import closed, LoopState
@@ -131,9 +131,11 @@ class Attempt(NamedTuple):
     lands: Any
     # which constraint was hit, or surface crossed
     hit: list
-    # a constraint is hit; or the motion slides along the surface it has reached
+    # a constraint is hit; or the motion cannot leave the surface that it has reached
     strikes: Any
-    slides: Any
+    stuck: Any
+    # as in `LoopState`
+    stale: tuple
     # a flight hidden by rounding
     hidden: Any
     begins: Any
@@ -177,15 +179,13 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
         locating=attempt.locates & active,
         stops=carried.stops + jnp.where(attempt.stopped, 1.0, 0.0),
         fastest=stop_gradient(jnp.where(good, fastest, carried.fastest)),
-        scale=tuple(
-            stop_gradient(jnp.where(good, jnp.maximum(s, jnp.abs(j.gap)), s))
-            for s, j in zip(carried.scale, attempt.jets, strict=True)
-        ),
+        scale=_scale(carried, attempt),
         blur=tuple(map(stop_gradient, select(good, attempt.blur, carried.blur))),
         held=tuple(map(stop_gradient, select(good, attempt.held, carried.held))),
         struck=struck,
         crowded=crowded,
         crossed=_crossed(carried, attempt),
+        stale=select(good, attempt.stale, carried.stale),
         origin=carried.origin,
         extents=moved_extents(carried.extents, carried.origin, attempt),
         ramp=stop_gradient(jnp.where(good, 6.0 * carried.ramp, carried.ramp)),
@@ -229,7 +229,7 @@ def _next_length(plan, carried, attempt, longest):
     # the step that completes a chatter did not follow the motion
     whole = (h > 0) & ~carried.completing
     inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
-    flags = closed(attempt.mode, len(carried.held))
+    flags = closed(attempt.mode, len(carried.held), len(carried.jets))
     for k, (jet, contact) in enumerate(zip(attempt.jets, flags, strict=True)):
         ends = carried.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
@@ -245,6 +245,20 @@ def _next_length(plan, carried, attempt, longest):
     known = (good & attempt.begins) | attempt.locates
     trial = jnp.where(known, attempt.fixed, trial)
     return jnp.where(carried.completing & ~good, carried.step, trial)
+
+
+def _scale(carried, attempt) -> tuple:
+    """Return the largest gap of each constraint and distance of each surface so far."""
+    found = []
+    for k, (s, jet) in enumerate(zip(carried.scale, attempt.jets, strict=True)):
+        grows = attempt.good
+        if carried.stale and k >= len(carried.held):
+            # its distance is then that of the end of sliding
+            slides = attempt.mode[len(carried.jets) + k - len(carried.held)]
+            grows = grows & ~slides
+        larger = jnp.maximum(s, jnp.abs(jet.gap))
+        found.append(jax.lax.stop_gradient(jnp.where(grows, larger, s)))
+    return tuple(found)
 
 
 def _struck(carried, attempt):
@@ -289,7 +303,7 @@ def _status(plan, carried, attempt, failures, crowded):
     if carried.crossed:
         room = _TOGETHER * carried.longest
         just = ~bad & (failures > _PATIENCE) & (carried.t - carried.crossed[0] <= room)
-        slides = attempt.good & attempt.slides
-        status = jnp.where(just | slides, SLIDES, status)
+        stuck = attempt.good & attempt.stuck
+        status = jnp.where(just | stuck, ACCUMULATES, status)
     status = jnp.where(reached, FINISHED, status)
     return jnp.where(carried.status == RUNNING, status, carried.status)

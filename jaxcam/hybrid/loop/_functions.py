@@ -14,25 +14,31 @@ from .._system import HybridSystem
 from ..lowering import joined, scalarise, split
 from ..runge_kutta import rates_among
 from ..surface import (
+    beyond_shares,
     completion_coefficients,
     field_in_force,
+    field_in_mode,
     free_jet,
     gap_rounding,
     gaps,
+    heights_rounded,
     impacts,
+    InMode,
     lie_series,
     mode_jet,
     normal_acceleration,
     normal_directions,
     normal_velocity,
-    OnSides,
     resets,
+    settled,
+    slack_of_hold,
     speed_rounding,
     surfaces,
     switched_jet,
     switched_rounding,
 )
 from ._gap_polynomial import Jet
+from ._jumps import jumping_components
 
 
 class Frame(NamedTuple):
@@ -48,8 +54,9 @@ class Functions:
     """Functions of `(t, x)` with `x` a tuple of scalars and the parameters bound.
 
     The discrete `mode` is a tuple of flags: whether each of the `m` constraints is in
-    contact, then whether the motion is on the negative side of each of the `k`
-    switching surfaces. Without surfaces, most functions do not depend on it.
+    contact, then whether the motion is, or came from, on the negative side of each of
+    the `k` switching surfaces, then whether it slides on each. Without surfaces, most
+    functions do not depend on it.
 
     `planar` systems have two states, one constraint and no surface: gap and normal
     velocity determine the state during contact, which then needs no integration.
@@ -63,19 +70,24 @@ class Functions:
         m = jax.eval_shape(lambda t, x: gaps(system, t, x), time, state).shape[0]
         k = jax.eval_shape(lambda t, x: surfaces(system, t, x), time, state).shape[0]
         flags = jax.ShapeDtypeStruct((m,), jnp.bool_)
-        sides = jax.ShapeDtypeStruct((k,), jnp.bool_)
+        mode = jax.ShapeDtypeStruct((m + 2 * k,), jnp.bool_)
         shapes = jax.tree.map(
             lambda p: jax.ShapeDtypeStruct(p.shape, p.dtype), parameters
         )
         self.n, self.m, self.k = n, m, k
         self.plain = plain
         self.planar = n == 2 and m == 1 and k == 0
+        jumps: tuple[tuple[int, ...], ...] = ()
+        if isinstance(system, SwitchedSystem):
+            jumps = jumping_components(system, shapes, time, state, k)
+        # surfaces on which a motion can slide
+        self.slidable = [number for number, changed in enumerate(jumps) if changed]
         self._parameters = jax.tree.map(split, parameters)
         self._memory: dict | None = None
 
         def bind(function, *example, whole_field=k == 0):
             if not whole_field:
-                function, example = on_sides(function), (*example, sides)
+                function, example = in_mode(function, m, jumps), (*example, mode)
 
             def whole(p, *arguments):
                 return function(eqx.combine(p, static), *arguments)
@@ -92,16 +104,23 @@ class Functions:
             self._jets = bind(_planar_jet, time, state, flags)
             self._taylor = bind(_free_taylor, time, state, flags)
         else:
-            self._field = bind(field_in_force, time, state, flags)
+            field = field_in_mode if k else field_in_force
+            self._field = bind(field, time, state, flags)
             jets = switched_jet if k else mode_jet
             self._jets = bind(jets, time, state, flags)
-            self._taylor = bind(_mode_taylor, time, state, flags)
+            taylor = functools.partial(_mode_taylor, field)
+            self._taylor = bind(taylor, time, state, flags)
         self._free = bind(lambda s, t, x: s.vector_field(t, x), time, state)
         blur = switched_rounding if k else gap_rounding
         self._blur = bind(blur, time, state, state)
         if k:
             self._resets = bind(resets, time, state)
             self._sides = bind(_negative, time, state, whole_field=True)
+        if self.slidable:
+            self._settled = bind(settled, time, state)
+            self._shares = bind(beyond_shares, time, state)
+            self._heights = bind(heights_rounded, time, state, state)
+            self._slack = bind(slack_of_hold)
         if not m:
             return
         self._impact = bind(impacts, time, state)
@@ -124,8 +143,8 @@ class Functions:
             self._memory = None
 
     def _side(self, mode) -> tuple:
-        """Return the sides of a mode as arguments: none without surfaces."""
-        return (_pack(mode[self.m :]),) if self.k else ()
+        """Return a mode as arguments: none without surfaces."""
+        return (_pack(mode),) if self.k else ()
 
     def field(self, t, x, mode):
         """Return the rate of change of the state in flight or, unless the system is
@@ -169,6 +188,29 @@ class Functions:
     def sides(self, t, x) -> tuple:
         """Return for each surface whether a start is on its negative side."""
         return tuple(self._sides(t, _pack(x))) if self.k else ()
+
+    def settled(self, t, x, mode):
+        """Return the state moved onto the surfaces on which it slides; and, for each
+        surface that slides, the change of the field beyond it.
+        """
+        if not self.slidable:
+            return x, []
+        rows = self._settled(t, _pack(x), *self._side(mode))
+        return tuple(rows[0]), [tuple(row) for row in rows[1:]]
+
+    def shares(self, t, x, mode) -> tuple:
+        """Return the shares of the branches beyond the surfaces on which it slides."""
+        return tuple(self._shares(t, _pack(x), *self._side(mode)))
+
+    def heights(self, t, x, extents, mode):
+        """Return the switching functions, and their rounding errors."""
+        reach = [jnp.abs(a) + b for a, b in zip(x, extents, strict=True)]
+        rows = self._heights(t, _pack(x), _pack(reach), *self._side(mode))
+        return tuple(rows[0]), tuple(rows[1])
+
+    def slack(self, mode) -> tuple:
+        """Return s = (holding - 1) / 2 of each surface."""
+        return tuple(self._slack(*self._side(mode)))
 
     def velocity(self, t, x, mode):
         """Return the normal velocities."""
@@ -240,12 +282,14 @@ def _pack(scalars) -> np.ndarray:
     return out
 
 
-def on_sides(function):
-    """Convert a `function` of a system to one on given sides, its last argument."""
+def in_mode(function, m: int, jumps: tuple):
+    """Convert a `function` of a system to one in a given mode, its last argument."""
 
     def call(system, *arguments):
-        *rest, negative = arguments
-        return function(OnSides(system, negative), *rest)
+        *rest, mode = arguments
+        k = (mode.shape[0] - m) // 2
+        contact, negative, sliding = mode[:m], mode[m : m + k], mode[m + k :]
+        return function(InMode(system, negative, sliding, contact, jumps), *rest)
 
     return call
 
@@ -277,8 +321,8 @@ def _free_taylor(system, t, x, contact):
     return _taylor_of(lambda s, y: system.vector_field(s, y), t, x)
 
 
-def _mode_taylor(system, t, x, contact):
-    return _taylor_of(lambda s, y: field_in_force(system, s, y, contact), t, x)
+def _mode_taylor(field, system, t, x, contact):
+    return _taylor_of(lambda s, y: field(system, s, y, contact), t, x)
 
 
 def _frame(system, t, x):

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from ..breakpoints import after
 from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
+from ._crossing import seen_again
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
@@ -65,9 +66,11 @@ def _iterate(
 ) -> tuple[LoopState, Record]:
     active = carried.status == RUNNING
     sticking = any_of(carried.contact)
-    rounding = [1e-15 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
+    rounding = [1e-15 * s + b for s, b in zip(carried.sizes, carried.blur, strict=True)]
     end = end_of_step(plan, carried, rounding)
     made = make_step(functions, plan, carried, end)
+    if carried.stale:
+        carried = seen_again(carried, made.jets)
     judged = _judge_flights(plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
     landing = land(functions, plan, carried, end, made, lands, flown, rounding)
@@ -135,7 +138,8 @@ def _iterate(
         hit=landing.hit,
         hidden=landing.hidden,
         strikes=landing.strikes,
-        slides=landing.slides,
+        stuck=landing.stuck,
+        stale=_stale(carried, landing, released),
         begins=begins,
         locates=locates,
         released=released,
@@ -146,9 +150,7 @@ def _iterate(
     )
     kind = _kind(carried, lands, begins, released, stopped)
     if functions.k:
-        crosses = lands & ~landing.strikes & ~landing.slides
-        kind = jnp.where(crosses, float(RowKind.SWITCH), kind)
-        kind = jnp.where(landing.slides, float(RowKind.STEP), kind)
+        kind = _kind_of_switch(carried, landing, lands, kind)
     record = Record(
         kind=jnp.where(good & active, kind, float(RowKind.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
@@ -171,18 +173,22 @@ def _judge_flights(
 ) -> Judged:
     """Detect events at the gaps that are open."""
     h, jets = end.length, made.jets
-    slack = [2e-12 * s + b for s, b in zip(carried.scale, carried.blur, strict=True)]
-    closed = carried.closed
+    slack = [2e-12 * s + b for s, b in zip(carried.sizes, carried.blur, strict=True)]
+    free = [~c for c in carried.closed]
+    if carried.stale:
+        # over the short rest of a chatter, whose contact may change the end of sliding
+        m = len(carried.held)
+        free[m:] = [f & ~carried.completing for f in free[m:]]
     verdicts = [
         _where_in_force(
-            ~closed[k],
+            free[k],
             judge(
                 carried.jets[k],
                 jet,
                 h,
                 slack[k],
                 rounding[k],
-                carried.scale[k],
+                carried.sizes[k],
                 end.room,
                 carried.longest,
             ),
@@ -269,6 +275,25 @@ def _kind(carried, lands, begins, released, stopped):
     kind = jnp.where(released, float(RowKind.RELEASE), kind)
     impact = jnp.where(begins, float(RowKind.LAST_IMPACT), float(RowKind.IMPACT))
     return jnp.where(lands, impact, kind)
+
+
+def _kind_of_switch(carried, landing: Landing, lands, kind):
+    """Return the kind of an attempt that ends at a switching surface, else `kind`."""
+    if carried.stale:
+        again = (carried.stale[0] > 0) & (kind == float(RowKind.STEP))
+        kind = jnp.where(again, float(RowKind.NOTHING), kind)
+    crosses = lands & ~landing.strikes & ~landing.stuck
+    kind = jnp.where(crosses, float(RowKind.SWITCH), kind)
+    kind = jnp.where(landing.slides, float(RowKind.SLIDE), kind)
+    kind = jnp.where(landing.leaves, float(RowKind.LEAVE), kind)
+    return jnp.where(landing.stuck, float(RowKind.STEP), kind)
+
+
+def _stale(carried, landing: Landing, released) -> tuple:
+    """Return whether the jets are not those of the new mode: see `LoopState`."""
+    if not carried.stale:
+        return ()
+    return (jnp.where(landing.slides, 2.0, jnp.where(released, 1.0, 0.0)),)
 
 
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):

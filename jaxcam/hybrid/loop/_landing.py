@@ -5,17 +5,14 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from ._advance import Plan
-from ._flight import moves_in, StepVerdict
+from ._crossing import past_surfaces, sides_after
+from ._flight import StepVerdict
 from ._functions import Functions
 from ._loop_state import LoopState
 from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
 from ._select import any_of, of_constraint, select
 from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
-
-
-# distance after a crossing, over the largest so far, that is the error of its location
-_NEAR = 1e-9
 
 
 class Landing(NamedTuple):
@@ -38,8 +35,11 @@ class Landing(NamedTuple):
     hidden: Any
     # whether a constraint is hit, not a switching surface crossed
     strikes: Any
-    # whether the motion cannot leave the surface that it has reached
+    # whether the motion slides along the surface that it has reached from here, whether
+    # it leaves one along which it slid, and whether it can do neither
     slides: Any
+    leaves: Any
+    stuck: Any
 
 
 def land(
@@ -53,11 +53,16 @@ def land(
     rounding,
 ) -> Landing:
     """Return the state after the impact if the step `lands`, otherwise at its end."""
+    no = jnp.asarray(False)
     offset = jnp.where(lands, flown.offset, 0.0)
     landed = taylor(made.x, made.rates, offset)
     t = end.t + offset
     seen = seen_from_inside(plan, end)(t)
     after_each = functions.impact(seen, landed, carried.mode)
+    for k in functions.slidable:
+        # the end of sliding is not a crossing
+        row = functions.m + k
+        after_each[row] = select(carried.sliding[k], landed, after_each[row])
     after = after_each[0]
     for k in range(1, len(after_each)):
         after = select(flown.constraint == k, after_each[k], after)
@@ -70,16 +75,22 @@ def land(
     )
     x = select(lands, after, made.x)
     mode = _kept_contacts(functions, carried, lands, seen, landed, x)
-    mode = mode + tuple(
-        carried.mode[k] ^ (lands & (flown.constraint == k))
-        for k in range(functions.m, functions.m + functions.k)
-    )
-    jets = functions.jets(seen, x, mode)
-    hit = [lands & (flown.constraint == k) for k in range(len(jets))]
-    strikes, slides = lands, False
+    number = functions.m + functions.k
+    hit = [lands & (flown.constraint == k) for k in range(number)]
+    strikes, slides, leaves, stuck = lands, no, no, no
     if functions.k:
         strikes = any_of(hit[: functions.m])
-        jets, slides = _past_surfaces(functions, carried, jets, hit, rounding)
+        sides = sides_after(functions, carried, made, hit, lands, seen, x)
+        mode = mode + sides.negative + sides.sliding
+    jets = functions.jets(seen, x, mode)
+    if functions.k:
+        passed = past_surfaces(
+            functions, carried, jets, hit, sides, approach, rounding
+        )
+        jets, stuck = passed.jets, passed.stuck
+        slides, leaves = any_of(passed.slides), any_of(sides.leaves)
+        flags = zip(mode[number:], passed.slides, strict=True)
+        mode = mode[:number] + tuple(a | b for a, b in flags)
 
     # do the remaining impacts take negligible time?
     rebound = jnp.maximum(
@@ -115,6 +126,8 @@ def land(
         hidden,
         strikes,
         slides,
+        leaves,
+        stuck,
     )
 
 
@@ -132,21 +145,6 @@ def _kept_contacts(functions, carried, lands, t, before, after):
         c & (~lands | (jnp.abs(new - old) <= 500 * (a + b)))
         for c, old, new, a, b in zip(carried.contact, *speeds, *rounding, strict=True)
     )
-
-
-def _past_surfaces(functions, carried, jets, hit, rounding):
-    """Return the jets after the crossing of a surface, whose distance is then zero.
-
-    With a hysteresis it is twice that, and after a reset any. Also returned is whether
-    the motion is driven back, so that it would slide.
-    """
-    jets, slides = list(jets), []
-    for k in range(functions.m, len(jets)):
-        near = _NEAR * carried.scale[k] + 4 * carried.blur[k]
-        on = hit[k] & (jnp.abs(jets[k].gap) <= near)
-        jets[k] = jets[k]._replace(gap=jnp.where(on, 0.0, jets[k].gap))
-        slides.append(on & moves_in(jets[k], rounding[k]))
-    return jets, any_of(slides)
 
 
 def _hides(carried, t, impact, pulled, rounding):

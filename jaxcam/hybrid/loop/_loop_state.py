@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ..codes import RUNNING, SLIDES
+from ..codes import ACCUMULATES, RUNNING
 from ..surface import forced_time, start_room
 from ._functions import Functions
 from ._gap_polynomial import Jet
@@ -44,6 +44,9 @@ class LoopState(NamedTuple):
     crowded: tuple
     # for switching surfaces: time of the last crossing
     crossed: tuple
+    # for surfaces along which a motion can slide: the mode has changed since the jets
+    # were computed, and those of surfaces (1) or of constraints as well (2) are old
+    stale: tuple
     # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
     extents: tuple
@@ -65,19 +68,43 @@ class LoopState(NamedTuple):
     @property
     def closed(self) -> tuple:
         """For each jet, whether its constraint is in contact; a surface is not."""
-        return closed(self.mode, len(self.held))
+        return closed(self.mode, len(self.held), len(self.jets))
+
+    @property
+    def negative(self) -> tuple:
+        """For each switching surface, whether the motion is on its negative side."""
+        return self.mode[len(self.held) : len(self.jets)]
+
+    @property
+    def sliding(self) -> tuple:
+        """Whether the motion slides along each switching surface."""
+        return self.mode[len(self.jets) :]
+
+    @property
+    def sizes(self) -> tuple:
+        """The largest value of each distance; one for that of the end of sliding."""
+        if not self.stale:
+            return self.scale
+        sliding = (jnp.asarray(False),) * len(self.held) + self.sliding
+        pairs = zip(sliding, self.scale, strict=True)
+        return tuple(jnp.where(slides, 1.0, s) for slides, s in pairs)
 
     @property
     def behind(self) -> list:
-        """For each switching surface, whether a jump of the state has crossed it."""
-        parts = (self.jets, self.scale, self.blur)
+        """For each switching surface, whether a jump of the state has crossed it; or,
+        while the motion slides, whether nothing holds it there any more.
+        """
+        parts = (self.jets, self.sizes, self.blur)
         rest = (part[len(self.held) :] for part in parts)
         return [j.gap < -(2e-12 * s + b) for j, s, b in zip(*rest, strict=True)]
 
 
-def closed(mode: tuple, constraints: int) -> tuple:
-    """Return the flags of contact, and False for each switching surface."""
-    return mode[:constraints] + tuple(jnp.asarray(False) for _ in mode[constraints:])
+def closed(mode: tuple, constraints: int, jets: int) -> tuple:
+    """Return the flags of contact, and False for each switching surface, of all
+    `jets`.
+    """
+    rest = range(jets - constraints)
+    return mode[:constraints] + tuple(jnp.asarray(False) for _ in rest)
 
 
 def first_state(
@@ -90,7 +117,7 @@ def first_state(
     `period` that of the forcing.
     """
     m, free = functions.m, tuple(jnp.asarray(False) for _ in range(functions.m))
-    sides, crossings, slides = first_sides(functions, t0, x, free)
+    sides, crossings, slides, stuck = first_sides(functions, t0, x, free)
     free = free + sides
     jets = functions.jets(t0, x, free)[:m] if m else []
     lifts = functions.lift(t0, x, free)
@@ -103,7 +130,7 @@ def first_state(
     )
     status = first_status(t0, x, t1, [jet.gap for jet in jets], tinies)
     if crossings:
-        status = jnp.where((status == RUNNING) & slides, SLIDES, status)
+        status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
     origin, extents = first_extents(lifts, jets, tinies, x)
     contact, settled = [], []
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
@@ -152,6 +179,7 @@ def first_state(
         struck=(-jnp.inf * one,) * m if m > 1 else (),
         crowded=(0.0 * one,) if m > 1 else (),
         crossed=(-jnp.inf * one,) if functions.k else (),
+        stale=(jnp.where(slides, 2.0, 0.0),) if functions.slidable else (),
         origin=origin,
         extents=extents,
         ramp=first,

@@ -59,7 +59,7 @@ def rest_of_chatter(functions, plan, impact: Impact, jets, mode, stop) -> Rest:
     at_end = a + rate * duration
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
     possible = possible & (a < 0) & (at_end < 0) & soon
-    contact = closed(mode, functions.m)
+    contact = closed(mode, functions.m, len(jets))
     for k, jet in enumerate(jets if len(jets) > 1 else ()):
         # no other gap closes in the meantime; over such a short time, it is a parabola
         left = jet.gap + duration * (jet.velocity + duration * jet.acceleration / 2)

@@ -67,18 +67,22 @@ def scales(extents, before, after, pairs, h, per_run) -> tuple:
     return tuple(found)
 
 
-def held_scales(scale, carried, push, pairs, h) -> tuple:
+def held_scales(scale, carried, push, kicks, pairs, h) -> tuple:
     """Return the scales of a step in contact, where suppressed motion counts as motion.
 
     Bodies at rest under balanced forces move by the rounding of these forces, which is
     not a measure of the scale of their motion. `push` are the directions in which the
-    multipliers (the accelerations of the jets) act; `pairs` is as in `scales`.
+    multipliers (the accelerations of the jets) act, and `kicks` the changes of the
+    field beyond the surfaces on which the motion slides; `pairs` is as in `scales`.
     """
     found = list(scale)
     for jet, held, direction in zip(carried.jets, carried.closed, push, strict=False):
         speed = jnp.where(held, h * jnp.abs(jet.acceleration), 0.0)
         for j, share in enumerate(direction):
             found[j] = jnp.maximum(found[j], speed * jnp.abs(share))
+    for kick in kicks:
+        for j, share in enumerate(kick):
+            found[j] = jnp.maximum(found[j], h * jnp.abs(share))
     for i, j in pairs.items():
         found[i] = jnp.maximum(found[i], h * found[j])
     return tuple(map(jax.lax.stop_gradient, found))

@@ -31,20 +31,23 @@ def first_status(t0, x, t1, gaps, rooms):
 def first_sides(functions: Functions, t, x, contact):
     """Return the sides of the switching surfaces on which a motion starts.
 
-    A start on a surface takes the side that its motion enters.
+    A start on a surface takes the side that its motion enters, or slides along it.
+    Where both branches leave the surface, it stays on the side that the system gives.
 
     Returns:
-        Flags of the negative sides; the jets of the surfaces there; and whether the
-        motion would slide along a surface.
+        Flags of the negative sides, then of sliding; the jets of the surfaces there,
+        not yet of sliding; whether the motion slides along a surface; and whether it
+        would have to, but cannot.
     """
     if not functions.k:
-        return (), [], False
+        return (), [], False, False
     m, sides = functions.m, list(functions.sides(t, x))
-    slides = jnp.asarray(False)
+    free = (jnp.asarray(False),) * functions.k
+    slides, stuck = list(free), jnp.asarray(False)
 
     def jet_of(k, flag):
         """Return the jet of a surface on one of its sides, and whether x is on it."""
-        mode = (*contact, *sides[:k], flag, *sides[k + 1 :])
+        mode = (*contact, *sides[:k], flag, *sides[k + 1 :], *free)
         jet = functions.jets(t, x, mode)[m + k]
         rounding = functions.blur(t, x, (0.0,) * functions.n, mode)[m + k]
         on = jnp.abs(jet.gap) <= rounding
@@ -52,9 +55,19 @@ def first_sides(functions: Functions, t, x, contact):
         return jet, on, on & moves_in(jet, rounding)
 
     for k, flag in enumerate(sides):
-        _, _, leaves = jet_of(k, flag)
-        _, on, back = jet_of(k, ~flag)
-        slides = slides | (leaves & on & back)
+        own, _, leaves = jet_of(k, flag)
+        other, on, back = jet_of(k, ~flag)
+        driven = leaves & on & back
+        if k in functions.slidable:
+            slack = functions.slack((*contact, *sides, *free))[k]
+            # both branches together, and the most that the stronger hold leaves of it
+            together = -(own.velocity + other.velocity)
+            fastest = jnp.maximum(own.velocity, other.velocity)
+            held = (slack > 0) & (together > 0) & (fastest <= slack * together)
+            slides[k] = driven | (on & held)
+            leaves = leaves & ~slides[k]
+        else:
+            stuck = stuck | driven
         sides[k] = flag ^ (leaves & ~back)
     jets: list[Jet] = [jet_of(k, flag)[0] for k, flag in enumerate(sides)]
-    return tuple(sides), jets, slides
+    return (*sides, *slides), jets, any_of(slides), stuck

@@ -62,6 +62,8 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
     if carried.crossed:
         # nor after a jump of the state across a switching surface
         now = now | any_of(carried.behind)
+    if carried.stale:
+        now = now | (carried.stale[0] > 0)
     wanted = jnp.where(now, 0.0, jax.lax.stop_gradient(carried.step))
     timed = carried.completing | carried.locating
     at_stop = (carried.t + wanted >= stop) & ~timed
@@ -93,12 +95,13 @@ def make_step(
         h,
     )
     seen = inside(end.t)
+    x, kicks = functions.settled(seen, x, carried.mode)
     pairs = rates_among(carried.x, stages[0])
     frame = functions.frame(seen, x, carried.mode)
     scale = scales(carried.extents, carried.x, x, pairs, h, plan.per_run)
     if not functions.planar:
         pairs = functions.pairs(carried.t, carried.x, carried.mode)
-        scale = held_scales(scale, carried, frame.push, pairs, h)
+        scale = held_scales(scale, carried, frame.push, kicks, pairs, h)
     allowed = error_allowed(scale, carried.x, x, plan.tolerance, plan.absolute)
     effort = error_norm(error, allowed)
     if functions.planar:

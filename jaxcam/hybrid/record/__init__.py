@@ -7,6 +7,7 @@ from ._events import (
     Impacts as Impacts,
     Steps as Steps,
     Switches as Switches,
+    SwitchKind as SwitchKind,
 )
 from ._printed import Printed as Printed, vector_text as vector_text
 from ._trajectory import Trajectory as Trajectory

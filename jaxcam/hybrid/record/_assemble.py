@@ -39,7 +39,7 @@ def assemble(
     """
     rows = log.kind.shape[0]
     k = _surfaces(system, t0, state)
-    m = mode.shape[0] - k
+    m = mode.shape[0] - 2 * k
     valid = log.kind > 0
     order = _places(xp, valid, rows, rows)
     count = xp.sum(valid)
@@ -50,7 +50,7 @@ def assemble(
 
     time = first(t0, log.t, xp.inf)
     kept = first(mode, log.mode > 0.5, False)
-    sides = xp.where(kept[:, m:], -1.0, 1.0) if k else None
+    sides = _sides(xp, kept[:, m : m + k], kept[:, m + k :]) if k else None
     kept = kept[:, :m] if k else kept
     steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1, sides)
     switches = _switches(xp, log, m, sizes[0]) if k else None
@@ -58,6 +58,11 @@ def assemble(
         return Parts(*_nothing(xp, state, log), steps, switches)
     impacts = _impacts(xp, system, log, sizes[0])
     return Parts(impacts, _contacts(xp, time, kept, count, sizes[1]), steps, switches)
+
+
+def _sides(xp: ModuleType, negative, sliding):
+    """Return the sides of the surfaces, zero where the motion slides."""
+    return xp.where(sliding, 0.0, xp.where(negative, -1.0, 1.0))
 
 
 def _surfaces(system, t0, state) -> int:
@@ -79,8 +84,8 @@ def _nothing(xp: ModuleType, state, log: Log) -> tuple[Impacts, Contacts]:
 
 
 def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
-    """Return the crossings of switching surfaces, of which the first has number `m`."""
-    crossed = rows_of_kind(log, RowKind.SWITCH)
+    """Return the events of switching surfaces, of which the first has number `m`."""
+    crossed = rows_of_kind(log, RowKind.SWITCH, RowKind.SLIDE, RowKind.LEAVE)
     number = xp.sum(crossed)
     index = _places(xp, crossed, size, 0)
     real = xp.arange(size) < number
@@ -93,6 +98,7 @@ def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
         which,
         xp.where(real, xp.where(negative > 0.5, -1.0, 1.0), xp.nan),
         number,
+        xp.where(real, log.kind[index] - float(RowKind.SWITCH), 0.0).astype(xp.int32),
     )
 
 

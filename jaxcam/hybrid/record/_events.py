@@ -1,5 +1,7 @@
 """The events of a trajectory, and its integration points."""
 
+import enum
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -73,42 +75,68 @@ class Contacts(Printed):
         return ShortTable(f"contacts: {len(rows)}", headings, rows)
 
 
+class SwitchKind(enum.IntEnum):
+    """What happens at a switching surface."""
+
+    CROSSES = 0
+    """The motion crosses the surface."""
+    SLIDES = 1
+    """It begins to slide along the surface: with dry friction, to stick."""
+    LEAVES = 2
+    """It leaves the surface along which it slid."""
+
+
+_SAID = {
+    SwitchKind.CROSSES: "crosses",
+    SwitchKind.SLIDES: "begins sliding",
+    SwitchKind.LEAVES: "leaves",
+}
+
+
 class Switches(Printed):
-    """The crossings of switching surfaces, in order; padded as `Impacts` is."""
+    """The events at switching surfaces, in order; padded as `Impacts` is.
+
+    An impact that ends sliding, because it moves the state off the surface, is only
+    among the impacts.
+    """
 
     time: Float[AnyArray, " k"]
-    """Time of each crossing (s), shape `(k,)`."""
+    """Time of each event (s), shape `(k,)`."""
     before: Float[AnyArray, "k n"]
-    """State just before each crossing, shape `(k, n)`."""
+    """State just before each event, shape `(k, n)`."""
     after: Float[AnyArray, "k n"]
     """State just after it, different only where the surface has a `reset`, shape
     `(k, n)`."""
     surface: Int[AnyArray, " k"]
     """Index of the surface, shape `(k,)`."""
     direction: Float[AnyArray, " k"]
-    """+1 where the switching function rises through the switch, -1 where it falls,
-    shape `(k,)`."""
+    """+1 where the switching function rises through the switch or from it, -1 where it
+    falls, shape `(k,)`."""
     count: Int[AnyArray | np.integer, ""]
-    """Number of crossings."""
+    """Number of events."""
+    kind: Int[AnyArray, " k"]
+    """What happens, as `SwitchKind`: 0 crosses, 1 begins sliding, 2 leaves; shape
+    `(k,)`."""
 
     def _batched(self) -> bool:
         return np.ndim(self.count) > 0
 
     def _table(self) -> ShortTable:
-        columns = (self.time, self.surface, self.direction, self.after)
+        columns = (self.time, self.surface, self.direction, self.kind, self.after)
         rows = [
             (
                 str(k + 1),
                 f"{t:.8g}",
                 str(which),
                 "rising" if direction > 0 else "falling",
+                _SAID[SwitchKind(int(kind))],
                 vector_text(state),
             )
-            for k, (t, which, direction, state) in enumerate(
+            for k, (t, which, direction, kind, state) in enumerate(
                 zip(*(numbers(one, self.count) for one in columns), strict=True)
             )
         ]
-        headings = ("switch", "time (s)", "surface", "direction", "state")
+        headings = ("switch", "time (s)", "surface", "direction", "motion", "state")
         return ShortTable(f"switches: {len(rows)}", headings, rows)
 
 
@@ -125,8 +153,8 @@ class Steps(Printed):
     count: Int[AnyArray | np.integer, ""]
     """Number of points."""
     sides: Float[AnyArray, "s surfaces"] | None = None
-    """Sides of the switching surfaces from this point on, +1 or -1, shape
-    `(s, surfaces)`; `None` without surfaces."""
+    """Sides of the switching surfaces from this point on, +1 or -1, or 0 while the
+    motion slides, shape `(s, surfaces)`; `None` without surfaces."""
 
     def _batched(self) -> bool:
         return np.ndim(self.count) > 0

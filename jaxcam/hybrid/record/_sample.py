@@ -51,7 +51,8 @@ def sample(system, settings: Settings, steps: Steps, times):
         x = tuple(steps.state[k, i] for i in range(n))
         mode = tuple(steps.contact[k, i] for i in range(functions.m))
         if steps.sides is not None:
-            mode = mode + tuple(steps.sides[k, i] < 0 for i in range(functions.k))
+            sides = [steps.sides[k, i] for i in range(functions.k)]
+            mode = mode + tuple(s < 0 for s in sides) + tuple(s == 0 for s in sides)
         start = steps.time[k]
         end = steps.time[jnp.minimum(k + 1, steps.count.astype(jnp.int64) - 1)]
         span = last - steps.time[0]
@@ -78,6 +79,7 @@ def advance(
     Functions are evaluated at `inside(time)`; errors are relative to `scale`, `(n,)`.
     """
     moved = _move(system, functions, settings, scale, t, x, mode, h, inside)
+    moved, _ = functions.settled(inside(t + h), moved, mode)
     if not functions.m:
         return moved
     held = mode[0]

@@ -41,10 +41,18 @@ from ._rounding import (
     speed_rounding as speed_rounding,
     start_room as start_room,
 )
+from ._sliding import (
+    beyond_shares as beyond_shares,
+    field_in_mode as field_in_mode,
+    heights_rounded as heights_rounded,
+    InMode as InMode,
+    settled as settled,
+    slack_of_hold as slack_of_hold,
+    switched_jet as switched_jet,
+    switched_rounding as switched_rounding,
+)
 from ._switches import (
     OnSides as OnSides,
     resets as resets,
     surfaces as surfaces,
-    switched_jet as switched_jet,
-    switched_rounding as switched_rounding,
 )

@@ -186,7 +186,7 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
         return jnp.where(contact, acceleration, jnp.zeros_like(acceleration))
     directions = normal_directions(system, t, x)
     gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
-    return _solve_masked(gradient @ directions.T, acceleration, contact)
+    return solve_masked(gradient @ directions.T, acceleration, contact)
 
 
 def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
@@ -271,17 +271,23 @@ def mode_jet(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, "m 4"]:
     For a constraint in contact, a and j are the multiplier q and its rate; the zero of
     q is the release.
     """
-    if not contact.shape[0]:
-        return jnp.zeros((0, 4))
 
     def field(s, y):
         return field_in_force(system, s, y, contact)
 
-    def gap(s, y):
-        return gaps(system, s, y)
-
     def multiplier(s, y):
         return contact_multipliers(system, s, y, contact)
+
+    return jet_along(system, t, x, contact, field, multiplier)
+
+
+def jet_along(system, t, x, contact, field: Callable, multiplier: Callable):
+    """Return the jets of `mode_jet` along a field, with the multipliers of contacts."""
+    if not contact.shape[0]:
+        return jnp.zeros((0, 4))
+
+    def gap(s, y):
+        return gaps(system, s, y)
 
     value, velocity, acceleration, jerk = lie_series(gap, field, 3)(t, x)
     pressing, release = lie_series(multiplier, field, 1)(t, x)
@@ -330,7 +336,7 @@ def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
     )
 
 
-def _solve_masked(matrix, right, mask):
+def solve_masked(matrix, right, mask):
     """Solve for the masked unknowns, zero elsewhere; elimination without pivoting.
 
     The matrix has a unit diagonal and is small (one row a constraint); unrolled so that

@@ -1,8 +1,4 @@
-"""Derive the motion relative to switching surfaces.
-
-The distance of a surface is its switching function on the side of the motion, plus its
-hysteresis: positive before a crossing, zero at it, as a gap is at an impact.
-"""
+"""The branches of a switched system, its switching functions and its resets."""
 
 from typing import Any
 
@@ -12,8 +8,6 @@ from jaxtyping import Array, Bool, Float
 from .._switched import SwitchedSystem
 from .._system import HybridSystem
 from .._types import RealScalar, State
-from ._normal import field_in_force, lie_series, mode_jet
-from ._rounding import gap_rounding, rounding_of
 
 
 class OnSides(HybridSystem):
@@ -74,34 +68,6 @@ def surfaces(system: HybridSystem, t, x) -> Float[Array, " k"]:
     return jnp.atleast_1d(system.switching(t, x))
 
 
-def distances(mode: OnSides, t, x) -> Float[Array, " k"]:
-    """Return the distance of each surface, zero at a crossing, shape `(k,)`."""
-    return mode.signs * surfaces(mode.system, t, x) + mode.system.hysteresis
-
-
 def resets(mode: OnSides, t, x) -> Float[Array, "k n"]:
     """Return the state after the crossing of each surface, one row for each."""
     return jnp.atleast_2d(mode.system.reset(t, x, mode.signs))
-
-
-def switched_jet(mode: OnSides, t, x, contact: Bool[Array, " m"]):
-    """Return distance and three rates of each constraint, then of each surface.
-
-    Shape `(m + k, 4)`; for a constraint in contact as `mode_jet`.
-    """
-
-    def field(s, y):
-        return field_in_force(mode, s, y, contact)
-
-    along = lie_series(lambda s, y: distances(mode, s, y), field, 3)(t, x)
-    own = jnp.stack(along, axis=1)
-    if not contact.shape[0]:
-        return own
-    return jnp.concatenate([mode_jet(mode, t, x, contact), own])
-
-
-def switched_rounding(mode: OnSides, t, x, reach: State):
-    """Return the rounding errors of the gaps, then of the distances of surfaces."""
-    own = rounding_of(lambda s, y: distances(mode, s, y), t, x, reach)
-    gaps = gap_rounding(mode, t, x, reach)
-    return jnp.concatenate([gaps, own]) if gaps.shape[0] else own

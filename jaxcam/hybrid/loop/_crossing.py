@@ -1,0 +1,130 @@
+"""Change the mode at a switching surface: cross it, slide along it, or leave it."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ._flight import moves_in
+from ._functions import Functions
+from ._gap_polynomial import Jet
+from ._loop_state import LoopState
+from ._step import Step
+
+
+# distance after a crossing, over the largest so far, that is the error of its location
+_NEAR = 1e-9
+# acceleration off a constraint, relative to that before the motion slid, that is
+# rounding
+_ZERO = 1e-11
+
+
+class Sides(NamedTuple):
+    """The flags of the switching surfaces after the event at the end of a step."""
+
+    # as in `Functions`, one flag for each surface
+    negative: tuple
+    sliding: tuple
+    # whether sliding along it ends here
+    leaves: list
+
+
+class Passed(NamedTuple):
+    """What follows a crossing, by its jets."""
+
+    jets: list
+    # for each surface, whether the motion slides along it from here
+    slides: list
+    # whether the motion cannot leave a surface, and cannot slide along it
+    stuck: Any
+
+
+def sides_after(
+    functions: Functions, carried: LoopState, made: Step, hit, lands, t, x
+) -> Sides:
+    """Return the sides after a step to the time `t`, and the state `x` there.
+
+    A crossing changes the side. Sliding ends on the side of which the share has reached
+    one; or, after a jump of the state, on the side on which the state is then.
+    """
+    negative, sliding = list(carried.negative), list(carried.sliding)
+    across = hit[functions.m :]
+    if not functions.slidable:
+        flags = [a ^ b for a, b in zip(negative, across, strict=True)]
+        return Sides(tuple(flags), tuple(sliding), [])
+    shares = functions.shares(t, made.x, carried.mode)
+    heights, blur = functions.heights(t, x, carried.extents, carried.mode)
+    leaves = [jnp.asarray(False) for _ in negative]
+    for k, crossed in enumerate(across):
+        if k not in functions.slidable:
+            negative[k] = negative[k] ^ crossed
+            continue
+        slid = sliding[k]
+        leaves[k] = crossed & slid
+        turns = jnp.where(slid, shares[k] > 0.5, True)
+        near = _NEAR * carried.scale[functions.m + k] + 500 * blur[k]
+        thrown = lands & ~crossed & slid & (jnp.abs(heights[k]) > near)
+        negative[k] = jnp.where(thrown, heights[k] < 0, negative[k] ^ (crossed & turns))
+        sliding[k] = slid & ~leaves[k] & ~thrown
+    return Sides(tuple(negative), tuple(sliding), leaves)
+
+
+def past_surfaces(
+    functions: Functions, carried: LoopState, jets, hit, sides: Sides, approach, blur
+) -> Passed:
+    """Return the jets after the crossing of a surface, whose distance is then zero.
+
+    With a hysteresis it is twice that, and after a reset any. If the far side drives
+    the motion back, it slides: the limit of the force that holds it there, over that of
+    the branch, is 1 + s. `approach` is the (negative) rate at which the motion came,
+    and `blur` the rounding errors of the distances.
+    """
+    jets, m = list(jets), functions.m
+    slides, stuck = [], jnp.asarray(False)
+    slack = functions.slack(carried.mode) if functions.slidable else ()
+    for k in range(functions.k):
+        jet, behind = jets[m + k], carried.behind[k]
+        near = _NEAR * carried.scale[m + k] + 4 * carried.blur[m + k]
+        left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
+        on = hit[m + k] & ~left & (jnp.abs(jet.gap) <= near)
+        back = on & moves_in(jet._replace(gap=jnp.where(on, 0.0, jet.gap)), blur[m + k])
+        gap = jnp.where(on | left, 0.0, jet.gap)
+        if k not in functions.slidable:
+            slides.append(jnp.asarray(False))
+            stuck = stuck | back
+            jets[m + k] = jet._replace(gap=gap)
+            continue
+        most = -approach * slack[k] / (1 + slack[k])
+        slides.append(back | (on & (slack[k] > 0) & (jet.velocity <= most)))
+        # at the limit of the force the motion leaves without a velocity
+        smooth = left & ~behind & (slack[k] == 0)
+        velocity = jnp.where(left, jnp.maximum(jet.velocity, 0.0), jet.velocity)
+        jets[m + k] = Jet(
+            gap,
+            jnp.where(smooth, 0.0, velocity),
+            jnp.where(smooth, jnp.maximum(jet.acceleration, 0.0), jet.acceleration),
+            jet.jerk,
+        )
+    return Passed(jets, slides, stuck)
+
+
+def seen_again(carried: LoopState, jets) -> LoopState:
+    """Replace the jets of a state whose mode has just changed by those of this mode.
+
+    **Arguments:** the state, and the `jets` at the end of a step of length zero.
+    """
+    (change,) = carried.stale
+    m, after = len(carried.held), list(carried.jets)
+    for k, (old, new) in enumerate(zip(carried.jets, jets, strict=True)):
+        if k < m:
+            rest = (old.gap == 0) & (old.velocity == 0)
+            tiny = jnp.abs(new.acceleration) <= _ZERO * jnp.abs(old.acceleration)
+            acceleration = jnp.where(rest & tiny, 0.0, new.acceleration)
+            fresh, all_of_it = Jet(old.gap, old.velocity, acceleration, new.jerk), 2.0
+        else:
+            # a distance that an event has made zero stays zero
+            gap = jnp.where((old.gap == 0) & ~carried.sliding[k - m], 0.0, new.gap)
+            fresh, all_of_it = new._replace(gap=gap), 1.0
+        after[k] = Jet(
+            *(jnp.where(change >= all_of_it, a, b) for a, b in zip(fresh, old, strict=True))
+        )
+    return carried._replace(jets=tuple(after))

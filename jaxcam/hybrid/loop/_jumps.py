@@ -1,0 +1,87 @@
+"""Find which components of a vector field change at each switching surface."""
+
+from typing import no_type_check
+
+import equinox as eqx
+import jax
+import numpy as np
+from jax.extend.core import Literal
+
+from .._switched import SwitchedSystem
+from ..lowering import scalarise, split
+from ..surface import surfaces
+
+
+def jumping_components(
+    system: SwitchedSystem, shapes, time, state, number: int
+) -> tuple[tuple[int, ...], ...]:
+    """Return, for each surface, the components of the field that its side changes.
+
+    They are read from the program of the branches, scalar by scalar. A surface whose
+    switching function depends on none of these components has none: the motion moves
+    towards it at the same speed on either side, so it cannot slide along it. An example
+    is a stop at a position, which changes a force.
+
+    Args:
+        system: The system; only its structure matters.
+        shapes: Shapes of its parameters, a pytree of `jax.ShapeDtypeStruct`.
+        time: Shape of the time.
+        state: Shape of the state.
+        number: Number of surfaces, k.
+
+    Returns:
+        Indices, one tuple for each surface.
+    """
+    _, static = eqx.partition(system, eqx.is_inexact_array)
+    k, n = number, state.shape[0]
+
+    def branch(p, t, x, sides):
+        return eqx.combine(p, static).branch(t, x, sides)
+
+    def switching(p, t, x):
+        return surfaces(eqx.combine(p, static), t, x)
+
+    sides = jax.ShapeDtypeStruct((k,), np.float64)
+    by_side = _dependence(branch, (shapes, time, state, sides), k)
+    by_state = _dependence(switching, (shapes, time, state), n)
+    return tuple(
+        tuple(changed) if set(changed) & by_state[surface] else ()
+        for surface in range(k)
+        for changed in [[i for i in range(n) if surface in by_side[i]]]
+    )
+
+
+@no_type_check
+def _dependence(function, example, last: int) -> list[set[int]]:
+    """Return for each component of the result on which components of the last argument
+    it depends.
+    """
+    scalar = scalarise(function, *example)
+    *rest, vector = example
+    flat, structure = jax.tree.flatten(rest)
+
+    def call(leaves, scalars):
+        others = jax.tree.unflatten(structure, [split(leaf) for leaf in leaves])
+        return list(scalar(*others, _packed(scalars)))
+
+    one = jax.ShapeDtypeStruct((), vector.dtype)
+    closed = jax.make_jaxpr(call)(flat, [one] * last)
+    jaxpr = closed.jaxpr
+    first = len(jaxpr.invars) - last
+    known = {v: {i} for i, v in enumerate(jaxpr.invars[first:])}
+
+    def of(v):
+        return set() if isinstance(v, Literal) else known.get(v, set())
+
+    for equation in jaxpr.eqns:
+        found = set().union(*(of(v) for v in equation.invars))
+        for v in equation.outvars:
+            known[v] = found
+    return [of(v) for v in jaxpr.outvars]
+
+
+def _packed(scalars) -> np.ndarray:
+    out = np.empty(len(scalars), dtype=object)
+    for i, s in enumerate(scalars):
+        out[i] = s
+    return out
