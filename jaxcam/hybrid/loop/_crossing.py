@@ -94,7 +94,7 @@ def past_surfaces(
             jets[m + k] = jet._replace(gap=gap)
             continue
         most = -approach * slack[k] / (1 + slack[k])
-        slides.append(back | (on & (slack[k] > 0) & (jet.velocity <= most)))
+        slides.append(on & (jet.velocity <= most))
         # at the limit of the force the motion leaves without a velocity
         smooth = left & ~behind & (slack[k] == 0)
         velocity = jnp.where(left, jnp.maximum(jet.velocity, 0.0), jet.velocity)

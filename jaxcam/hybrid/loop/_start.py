@@ -57,17 +57,15 @@ def first_sides(functions: Functions, t, x, contact):
     for k, flag in enumerate(sides):
         own, _, leaves = jet_of(k, flag)
         other, on, back = jet_of(k, ~flag)
-        driven = leaves & on & back
         if k in functions.slidable:
             slack = functions.slack((*contact, *sides, *free))[k]
             # both branches together, and the most that the stronger hold leaves of it
             together = -(own.velocity + other.velocity)
             fastest = jnp.maximum(own.velocity, other.velocity)
-            held = (slack > 0) & (together > 0) & (fastest <= slack * together)
-            slides[k] = driven | (on & held)
+            slides[k] = on & (together > 0) & (fastest <= slack * together)
             leaves = leaves & ~slides[k]
         else:
-            stuck = stuck | driven
+            stuck = stuck | (leaves & on & back)
         sides[k] = flag ^ (leaves & ~back)
     jets: list[Jet] = [jet_of(k, flag)[0] for k, flag in enumerate(sides)]
     return (*sides, *slides), jets, any_of(slides), stuck

@@ -212,7 +212,7 @@ def beyond_shares(mode: InMode, t, x) -> Float[Array, " k"]:
     return jnp.stack([places.get(k, zero) for k in range(len(mode.jumps))])
 
 
-def settled(mode: InMode, t, x) -> Float[Array, "K+1 n"]:
+def settled(mode: InMode, t, x) -> Float[Array, "rows n"]:
     """Return the state moved onto the surfaces on which it slides, by one Newton step,
     then the change of the field beyond each, zero where it does not slide.
 
