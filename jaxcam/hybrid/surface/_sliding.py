@@ -85,8 +85,8 @@ class SlideTerms(NamedTuple):
     gains: Float[Array, "K K"]
     # whether the sides drive the motion to the surface when it leaves it
     firm: Bool[Array, " K"]
-    # whether contact forces undo what the sides change
-    held: Bool[Array, " K"]
+    # whether a contact holds the motion at rest there, whatever the sides
+    still: Bool[Array, " K"]
     # the field on the side from which the motion came
     field: Float[Array, " n"]
 
@@ -116,16 +116,17 @@ def slide_terms(mode: InMode, t, x) -> SlideTerms:
     gains, field = gains_of(kicks), free
     number = range(len(chosen))
     own = jnp.stack([gains[i, i] for i in number])
-    least, held = jnp.zeros_like(own), jnp.zeros(len(chosen), dtype=bool)
+    least = jnp.zeros_like(own)
     if mode.contact.shape[0]:
         field = field_in_force(before, t, x, mode.contact)
         kicks = [field_in_force(side, t, x, mode.contact) - field for side in beyond]
         gains, least = gains_of(kicks), _UNDONE * jnp.abs(own)
         own = jnp.stack([gains[i, i] for i in number])
-        held = (least > 0) & (jnp.abs(own) <= least)
     values, slopes = jax.jvp(heights, (t, x), (jnp.ones_like(t), field))
+    largest = jnp.maximum(jnp.abs(own), jnp.abs(slopes))
+    still = (least > 0) & (largest <= least)
     kicks = jnp.stack(kicks)
-    return SlideTerms(values, slopes, kicks, gains, own > least, held, field)
+    return SlideTerms(values, slopes, kicks, gains, own > least, still, field)
 
 
 def shares(mode: InMode, terms: SlideTerms) -> Float[Array, " K"]:
@@ -260,13 +261,13 @@ def switched_jet(mode: InMode, t, x, contact: Bool[Array, " m"]):
 
 
 def _still(mode: InMode, t, x, jets):
-    """Remove the rates of surfaces on which a contact holds the motion: rounding."""
+    """Remove the rates at surfaces where a contact holds the motion: rounding."""
     if not mode.slidable:
         return jets
-    held, rows = slide_terms(mode, t, x).held, list(jets)
+    still, rows = slide_terms(mode, t, x).still, list(jets)
     for i, k in enumerate(mode.slidable):
         at_rest = jnp.concatenate([rows[k][:1], jnp.zeros_like(rows[k][1:])])
-        rows[k] = jnp.where(held[i], at_rest, rows[k])
+        rows[k] = jnp.where(still[i], at_rest, rows[k])
     return jnp.stack(rows)
 
 
