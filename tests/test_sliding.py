@@ -186,50 +186,250 @@ def test_stick_slip_cycle_with_static_friction(static):
         assert largest(ends, np.broadcast_to([2 * f - leave, belt], ends.shape)) < 1e-11
 
 
-def energy(system: Rubbing, states):
-    return (states[:, 0] ** 2 + states[:, 1] ** 2) / 2
-
-
 class Hitting(Rubbing):
-    """The same block with a wall at x = wall, restitution 0.5."""
+    """The same block and a wall at x = wall + swing cos(omega t)."""
 
-    wall: float = 0.8
+    wall: float = 0.5
     restitution: float = 0.5
+    swing: float = 0.0
 
     def gap(self, t, state):
-        return self.wall - state[0]
+        return self.wall + self.swing * jnp.cos(self.omega * t) - state[0]
 
     def impact(self, t, state):
-        return jnp.stack([state[0], -self.restitution * state[1]])
+        speed = -self.swing * self.omega * jnp.sin(self.omega * t)
+        rebound = speed - self.restitution * (state[1] - speed)
+        return jnp.stack([state[0], rebound])
+
+
+def falls(system, run):
+    """The energy of a body without a drive never grows."""
+    states = np.asarray(run.steps.state)
+    energy = np.sum(states**2, axis=1) / 2
+    assert np.all(np.diff(energy) <= 1e-11 * (1 + energy[0]))
+    slides = np.asarray(run.steps.sides[:, 0]) == 0
+    assert np.max(np.abs(states[slides, 1] - system.belt), initial=0.0) <= 1e-10
 
 
 def test_block_that_hits_a_wall_and_rubs():
-    """Arcs between impacts and turning points; it sticks in its dead zone."""
+    """Arcs about -f and f between turning points and impacts; then it sticks."""
     f, wall, r = 0.1, 0.5, 0.5
-    run = run_of(Hitting(friction=f, wall=wall), [-2.0, 0.0], 30.0)
-    # the wall, by energy: (x + f)^2 + v^2 is constant while v > 0
+    system = Hitting(friction=f, wall=wall, restitution=r)
+    run = run_of(system, [-2.0, 0.0], 30.0)
     t, x, impacts, turns = 0.0, -2.0, [], []
-    while True:
-        # rising from (x, 0): an arc about -f
-        if abs(x) <= f:
-            break
-        radius = -(x + f)
-        if radius - f > wall:
+    while abs(x) > f:
+        radius = abs(x) - f
+        if x < 0 and radius - f > wall:
+            # rising about -f to the wall, then falling about f
             t += np.arccos(-(wall + f) / radius)
-            v = r * np.sqrt(radius**2 - (wall + f) ** 2)
             impacts.append(t)
-            # falling: an arc about +f
-            radius = np.hypot(wall - f, v)
-            t += np.pi - np.arctan2(v, wall - f) + 0.0
-            x = f - radius
-            turns.append((t, x))
+            v = r * np.sqrt(radius**2 - (wall + f) ** 2)
+            t += np.pi - np.arctan2(v, wall - f)
+            x = f - np.hypot(wall - f, v)
         else:
-            x = radius - f
-            t += np.pi
-            turns.append((t, x))
-            if abs(x) <= f:
-                break
-            x = f - (x - f)
-            t += np.pi
-            turns.append((t, x))
-    print(impacts, turns, run.impacts, run.switches)
+            t, x = t + np.pi, (radius - f) * -np.sign(x)
+        turns.append((t, x))
+    assert len(impacts) == 2 and len(turns) == 4
+    assert largest(run.impacts.time, impacts) < 1e-11
+    turning = np.abs(run.switches.after[:, 1]) < 1e-9
+    assert largest(run.switches.time[turning], [t for t, _ in turns]) < 1e-11
+    assert largest(run.switches.after[turning, 0], [x for _, x in turns]) < 1e-11
+    assert run.switches.kind[-1] == SLIDES
+    falls(system, run)
+
+
+def test_block_that_a_spring_pushes_against_a_wall():
+    """It comes to rest on the wall, or sticks in front of it after a rebound."""
+    for friction, contacts in ((0.1, 1), (0.6, 0)):
+        system = Hitting(friction=friction, wall=-0.5)
+        run = run_of(system, [-2.0, 0.0], 30.0)
+        falls(system, run)
+        assert int(run.contacts.count) == contacts
+        assert run.final[1] == 0 and (run.final[0] == -0.5) == (contacts == 1)
+
+
+def test_a_wall_lets_go_before_friction_does():
+    """The drive pulls the block off the wall; friction holds until its limit."""
+    f, w = 0.1, 0.5
+    system = Hitting(friction=f, wall=-0.5, drive=1.0, omega=w)
+    run = run_of(system, [-2.0, 0.0], 60.0)
+    assert int(run.contacts.count) >= 3
+    slides, leaves = (
+        np.asarray(run.switches.time[run.switches.kind == kind])
+        for kind in (SLIDES, LEAVES)
+    )
+    assert len(slides) == len(leaves) >= 1
+    assert np.all(np.isin(slides, np.asarray(run.contacts.end)))
+    assert largest(np.cos(w * leaves) + 0.5, -f) < 1e-12
+
+
+def test_a_moving_wall_pushes_a_block_that_then_sticks():
+    """It leaves the block behind where it turns back."""
+    system = Hitting(friction=0.6, wall=0.2, swing=0.3)
+    run = run_of(system, [0.3, 0.0], 9.0)
+    assert int(run.contacts.count) == 1
+    assert largest(run.contacts.end, np.pi) < 1e-9
+    assert largest(run.final, [-0.1, 0.0]) < 1e-9
+    # an impact ends sliding, and another sliding follows
+    hit = int(np.argmax(run.steps.time >= run.impacts.time[0]))
+    assert run.steps.sides[0, 0] == 0 and run.steps.sides[hit, 0] != 0
+    assert run.steps.sides[-1, 0] == 0
+
+
+class Chain(SwitchedSystem):
+    """Two masses with dry friction between springs; the first one is driven."""
+
+    friction: jax.Array
+    drive: float = 1.5
+    omega: float = 0.7
+
+    def switching(self, t, state):
+        del t
+        return state[2:]
+
+    def branch(self, t, state, sides):
+        x, y = state[0], state[1]
+        push = jnp.stack([self.drive * jnp.sin(self.omega * t) - 2 * x + y, x - 2 * y])
+        return jnp.concatenate([state[2:], push - self.friction * sides])
+
+
+def test_two_masses_stick_and_let_go_one_after_the_other():
+    f, g, a, w = 0.5, 0.3, 1.5, 0.7
+    system = Chain(jnp.array([f, g]), drive=a, omega=w)
+    run = run_of(system, np.zeros(4), 8.0)
+    assert np.all(np.asarray(run.steps.sides[0]) == 0)
+    first = np.arcsin(f / a) / w
+
+    # x'' + 2 x = a sin(w t) - f from rest, until the spring pulls the other with g
+    root, gain = np.sqrt(2.0), a / (2 - w**2)
+
+    def x(t):
+        lag = t - first
+        c = f / 2 - gain * np.sin(w * first)
+        d = -gain * w * np.cos(w * first) / root
+        moved = c * np.cos(root * lag) + d * np.sin(root * lag)
+        return gain * np.sin(w * t) - f / 2 + moved
+
+    second = brentq(lambda t: x(t) - g, first, first + 2.0, xtol=1e-15)
+    assert list(run.switches.kind[:2]) == [LEAVES, LEAVES]
+    assert list(run.switches.surface[:2]) == [0, 1]
+    assert largest(run.switches.time[:2], [first, second]) < 1e-11
+    # what follows, by another integrator: smooth pieces between the events found
+    times = np.append(np.asarray(run.switches.time), 8.0)
+    t, y = times[1], np.asarray(run.switches.after[1])
+    for k, end in enumerate(times[2:], start=1):
+        row = int(np.flatnonzero(np.asarray(run.steps.time) == t)[-1])
+        sides = np.asarray(run.steps.sides[row])
+
+        def field(s, z, sides=sides):
+            push = [a * np.sin(w * s) - 2 * z[0] + z[1], z[0] - 2 * z[1]]
+            free = np.array(push) - np.array([f, g]) * sides
+            return np.concatenate([z[2:], np.where(sides == 0, 0.0, free)])
+
+        made = solve_ivp(field, (t, end), y, "DOP853", rtol=1e-13, atol=1e-14)
+        t, y = end, made.y[:, -1]
+        if k + 1 < len(run.switches.time):
+            assert largest(run.switches.after[k + 1], y) < 1e-10
+            push = [a * np.sin(w * t) - 2 * y[0] + y[1], y[0] - 2 * y[1]]
+            which, kind = int(run.switches.surface[k + 1]), run.switches.kind[k + 1]
+            limit = [f, g][which]
+            if kind == LEAVES:
+                assert abs(abs(push[which]) - limit) < 1e-10
+            if kind == SLIDES:
+                assert abs(push[which]) < limit
+            if kind == CROSSES:
+                assert abs(push[which]) > limit
+    assert largest(run.final, y) < 1e-10
+    assert set(np.asarray(run.switches.kind)) == {CROSSES, SLIDES, LEAVES}
+
+
+@settings(max_examples=40)
+@given(
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+    st.floats(0.01, 1.0),
+    st.floats(1.0, 2.0),
+    st.floats(-1.5, 1.5),
+)
+def test_energy_falls_and_a_stuck_body_rests(x, v, friction, static, wall):
+    system = Rubbing(friction=friction, static=static)
+    run = jaxcam.simulate(system, [x, v], 0.0, 25.0)
+    assert run.successful
+    falls(system, run)
+    system = Hitting(friction=friction, static=static, wall=wall)
+    run = jaxcam.simulate(system, [min(x, wall - 0.01), v], 0.0, 25.0)
+    assert run.successful, run.result
+    falls(system, run)
+
+
+def test_a_batch_is_what_its_members_are():
+    forces = jnp.array([0.2, 0.5, 0.6, 1.2])
+    states = jnp.array([[0.3, 0.5], [-1.0, 0.0], [2.0, 0.1], [0.0, 0.0]])
+
+    def run(force, state):
+        system = Rubbing(friction=force, drive=jnp.asarray(1.0), omega=jnp.asarray(0.5))
+        found = jaxcam.simulate(system, state, 0.0, 30.0, max_steps=512)
+        return found.switches, found.code
+
+    switches, codes = jax.jit(jax.vmap(run))(forces, states)
+    assert np.all(codes == 0)
+    for k, (force, state) in enumerate(zip(forces, states, strict=True)):
+        alone = jaxcam.simulate(
+            Rubbing(friction=force, drive=1.0, omega=0.5), state, 0.0, 30.0
+        )
+        count = int(alone.switches.count)
+        assert int(switches.count[k]) == count
+        assert largest(switches.time[k, :count], alone.switches.time) < 1e-9
+        assert np.array_equal(switches.kind[k, :count], alone.switches.kind)
+    assert np.max(switches.count) > 5
+
+
+_slopes = eqx.filter_jit(
+    lambda system, state, t1: jax.jacfwd(
+        lambda s, x: end_of(s, x, t1).state, argnums=(0, 1)
+    )(system, state)
+)
+
+
+def arrays(system):
+    return jax.tree.map(lambda a: jnp.asarray(a, dtype=jnp.float64), system)
+
+
+def test_derivatives_through_stick_and_slip():
+    """Entering, sliding and leaving, against closed forms and central differences."""
+    # a block on a belt: the end forgets the start once it has stuck
+    f, belt, x0, v0, t1 = 0.4, 0.3, -0.9, 0.5, 6.0
+    system, state = arrays(Rubbing(friction=f, belt=belt)), jnp.array([x0, v0])
+    by_system, by_state = _slopes(system, state, jnp.asarray(t1))
+
+    def end(f, belt, x0, v0):
+        radius, phase = jnp.hypot(x0 + f, v0), jnp.arctan2(v0, x0 + f)
+        first = phase - jnp.arcsin(belt / radius)
+        x1 = -f + radius * jnp.cos(first - phase)
+        angle = t1 - first - (f - x1) / belt
+        return jnp.stack([f + belt * jnp.sin(angle), belt * jnp.cos(angle)])
+
+    exact = jax.jacfwd(end, argnums=(0, 1, 2, 3))(f, belt, x0, v0)
+    found = by_system.friction, by_system.belt, by_state[:, 0], by_state[:, 1]
+    assert largest(found, exact) < 1e-9
+    # forced motions with several sticks
+    for drive, omega, friction in ((1.0, 0.5, 0.6), (2.0, 1.7, 0.4), (1.0, 0.25, 0.5)):
+        system = Rubbing(friction=friction, drive=drive, omega=omega, static=1.1)
+        system, state, t1 = arrays(system), jnp.array([0.3, 0.5]), jnp.asarray(13.0)
+        by_system, by_state = _slopes(system, state, t1)
+        for name in ("friction", "drive", "omega", "static", "belt"):
+            step = 1e-5
+            ends = [
+                end_of(
+                    eqx.tree_at(lambda s: getattr(s, name), system, replace_fn=up),
+                    state,
+                    t1,
+                ).state
+                for up in (lambda a: a + step, lambda a: a - step)
+            ]
+            wanted = (ends[0] - ends[1]) / (2 * step)
+            size = 1 + np.max(np.abs(wanted))
+            assert largest(getattr(by_system, name), wanted) < 1e-6 * size
+        for i, unit in enumerate(np.eye(2)):
+            ends = [end_of(system, state + s * 1e-5 * unit, t1).state for s in (1, -1)]
+            assert largest(by_state[:, i], (ends[0] - ends[1]) / 2e-5) < 1e-6

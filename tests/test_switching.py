@@ -98,7 +98,7 @@ def test_random_systems_against_another_integrator(jump):
         assert np.array_equal(run.switches.surface, which)
         assert np.max(np.abs(run.switches.time - times), initial=0.0) < 1e-9
         assert np.max(np.abs(run.final - end)) < 1e-8
-        assert RESULTS[run.code] == (RESULTS[RESULTS.slides] if stop < 4.0 else "")
+        assert RESULTS[run.code] == (RESULTS[RESULTS.accumulates] if stop < 4.0 else "")
         if stop < 4.0:
             assert abs(float(run.steps.time[-1]) - stop) < 1e-9
         crossings, slides = crossings + len(times), slides + (stop < 4.0)
