@@ -54,38 +54,52 @@ def random_affine(rng, *, jump: float, width: float = 0.0) -> Affine:
 
 
 def integrated(system: Affine, state, t1):
-    """Crossings (times, surfaces) of an affine system by scipy, one branch at a time.
+    """Events of an affine system by scipy, one mode at a time.
 
-    Also the final state, and the time at which the motion slides, or infinity.
+    Their times, surfaces and kinds (0 crosses, 1 begins sliding, 2 leaves), and the
+    final state. While it slides on surfaces, their shares of the positive branch make
+    the rates of their switching functions zero.
     """
     a, jumps, b, pushes, c, d, width = (np.asarray(x) for x in jax.tree.leaves(system))
-    t, x, times, which = 0.0, np.asarray(state, float), [], []
-    on = np.where(c @ x - d > 0, 1.0, 0.0)
+    t, x, events = 0.0, np.asarray(state, float), []
+    on, slides = np.where(c @ x - d > 0, 1.0, 0.0), np.zeros(len(d), dtype=bool)
 
     def field(on, x):
         return (a + np.tensordot(on, jumps, 1)) @ x + b + on @ pushes
 
+    def shares(on, slides, x):
+        on = on.copy()
+        (held,) = np.nonzero(slides)
+        if len(held):
+            free = np.where(slides, 0.0, on)
+            gains = jumps @ x + pushes
+            part = np.linalg.solve(c[held] @ gains[held].T, -c[held] @ field(free, x))
+            on[held] = part
+        return on
+
+    def distance(i, on, slides, x):
+        """Falls through zero at a crossing, or at the end of sliding."""
+        if slides[i]:
+            share = shares(on, slides, x)[i]
+            return share * (1 - share)
+        return (2 * on[i] - 1) * (c[i] @ x - d[i]) + width[i]
+
     while t < t1:
-        # the distance of each surface falls through zero at a crossing
-
-        def distance(_, y, i, on):
-            return (2 * on[i] - 1) * (c[i] @ y - d[i]) + width[i]
-
-        events = []
+        watched = []
         for i in range(len(d)):
 
-            def event(s, y, i=i, on=on):
-                return distance(s, y, i, on)
+            def event(s, y, i=i, on=on, slides=slides):
+                return distance(i, on, slides, y)
 
             # a start on the surface is behind it
             event.terminal, event.direction = True, -1
-            events.append(event)
+            watched.append(event)
         run = solve_ivp(
-            lambda s, y, on=on: field(on, y),
+            lambda s, y, on=on, slides=slides: field(shares(on, slides, y), y),
             (t, t1),
             x,
             "DOP853",
-            events=events,
+            events=watched,
             rtol=1e-13,
             atol=1e-14,
             max_step=0.05,
@@ -95,13 +109,26 @@ def integrated(system: Affine, state, t1):
             break
         (i,) = [i for i, found in enumerate(run.t_events) if len(found)]
         t, x = run.t_events[i][0], run.y_events[i][0]
-        on = on.copy()
-        on[i] = 1 - on[i]
-        if width[i] == 0 and (2 * on[i] - 1) * (c[i] @ field(on, x)) < 0:
-            return np.array(times), np.array(which), x, t
-        times.append(t)
-        which.append(i)
-    return np.array(times), np.array(which), x, np.inf
+        on, slides = on.copy(), slides.copy()
+        waiting = [i]
+        while waiting:
+            i = waiting[0]
+            if slides[i]:
+                on[i] = np.round(np.clip(shares(on, slides, x)[i], 0.0, 1.0))
+                slides[i] = False
+                events.append((t, i, 2))
+            else:
+                on[i] = 1 - on[i]
+                rate = (2 * on[i] - 1) * (c[i] @ field(shares(on, slides, x), x))
+                slides[i] = width[i] == 0 and rate < 0
+                events.append((t, i, 1 if slides[i] else 0))
+            waiting = [
+                j
+                for j in np.flatnonzero(slides)
+                if distance(j, on, slides, x) < -1e-9
+            ]
+    times, which, kinds = np.array(events).reshape(-1, 3).T
+    return times, which, kinds, x
 
 
 def bilinear_motion(system: BilinearOscillator, state, t1):
