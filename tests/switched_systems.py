@@ -123,9 +123,7 @@ def integrated(system: Affine, state, t1):
                 slides[i] = width[i] == 0 and rate < 0
                 events.append((t, i, 1 if slides[i] else 0))
             waiting = [
-                j
-                for j in np.flatnonzero(slides)
-                if distance(j, on, slides, x) < -1e-9
+                j for j in np.flatnonzero(slides) if distance(j, on, slides, x) < -1e-9
             ]
     times, which, kinds = np.array(events).reshape(-1, 3).T
     return times, which, kinds, x

@@ -43,7 +43,7 @@ from jaxcam.hybrid.lowering._materialise import without_library
 from jaxcam.hybrid.lowering._packing import pack
 from jaxcam.hybrid.lowering._sincos import sincos
 from jaxcam.hybrid.runge_kutta import step, tableau_of
-from jaxcam.hybrid.surface._normal import solve_masked
+from jaxcam.hybrid.surface._masked import solve_masked
 from jaxcam.models import BouncingBall
 
 

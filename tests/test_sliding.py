@@ -174,7 +174,7 @@ def test_stick_slip_cycle_with_static_friction(static):
     f, belt = 0.4, 0.3
     run = run_of(Rubbing(friction=f, belt=belt, static=static), [0.0, belt], 60.0)
     leave = static * f
-    # an arc about f through (leave, belt): it returns to the belt's speed at 2 f - leave
+    # an arc about f through (leave, belt), which returns to this speed at 2 f - leave
     slip = 2 * np.pi - 2 * np.arctan2(leave - f, belt)
     stick = (2 * leave - 2 * f) / belt
     leaves = np.asarray(run.switches.time[run.switches.kind == LEAVES])

@@ -151,7 +151,7 @@ def test_a_relay_without_hysteresis_slides(start):
     """Where both branches point to the surface, from the time of arrival."""
     run = jaxcam.simulate(Relay(), [start, 0.0], 0.0, 2.0)
     assert run.successful
-    assert run.final[0] == 0 and run.final[1] == 2
+    assert run.final[0] == 0 and abs(run.final[1] - 2) < 1e-14
     assert int(run.switches.count) == (1 if start else 0)
     assert run.steps.sides[-1, 0] == 0
     if start:

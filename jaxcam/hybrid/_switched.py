@@ -90,8 +90,9 @@ class SwitchedSystem(HybridSystem):
 
         By default the signs of the switching functions. A start on a surface takes the
         side that the motion enters, or slides; where both branches leave the surface,
-        the motion is not unique, and the side is the one that this returns. With hysteresis the state may allow both: override
-        this, for example with a field of the system.
+        the motion is not unique, and the side is the one that this returns. With
+        hysteresis the state may allow both: override this, for example with a field of
+        the system.
 
         Args:
             t: Time (s).

@@ -12,6 +12,7 @@ from ._contact_load import (
     float_speed as float_speed,
 )
 from ._desmodromic import DesmodromicCam as DesmodromicCam
+from ._dry_friction_oscillator import DryFrictionOscillator as DryFrictionOscillator
 from ._forced_oscillator import ForcedOscillator as ForcedOscillator
 from ._gear_backlash import GearBacklash as GearBacklash
 from ._impact_oscillator import ImpactOscillator as ImpactOscillator

@@ -8,6 +8,7 @@ from ._flight import moves_in
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._loop_state import LoopState
+from ._select import select
 from ._step import Step
 
 
@@ -119,12 +120,15 @@ def seen_again(carried: LoopState, jets) -> LoopState:
             rest = (old.gap == 0) & (old.velocity == 0)
             tiny = jnp.abs(new.acceleration) <= _ZERO * jnp.abs(old.acceleration)
             acceleration = jnp.where(rest & tiny, 0.0, new.acceleration)
-            fresh, all_of_it = Jet(old.gap, old.velocity, acceleration, new.jerk), 2.0
+            fresh, least = Jet(old.gap, old.velocity, acceleration, new.jerk), 2.0
         else:
             # a distance that an event has made zero stays zero
             gap = jnp.where((old.gap == 0) & ~carried.sliding[k - m], 0.0, new.gap)
             fresh, all_of_it = new._replace(gap=gap), 1.0
         after[k] = Jet(
-            *(jnp.where(change >= all_of_it, a, b) for a, b in zip(fresh, old, strict=True))
+            *(
+                jnp.where(change >= all_of_it, a, b)
+                for a, b in zip(fresh, old, strict=True)
+            )
         )
     return carried._replace(jets=tuple(after))

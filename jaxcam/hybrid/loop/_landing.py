@@ -84,9 +84,7 @@ def land(
         mode = mode + sides.negative + sides.sliding
     jets = functions.jets(seen, x, mode)
     if functions.k:
-        passed = past_surfaces(
-            functions, carried, jets, hit, sides, approach, rounding
-        )
+        passed = past_surfaces(functions, carried, jets, hit, sides, approach, rounding)
         jets, stuck = passed.jets, passed.stuck
         slides, leaves = any_of(passed.slides), any_of(sides.leaves)
         flags = zip(mode[number:], passed.slides, strict=True)

@@ -16,6 +16,7 @@ from jaxtyping import Array, Bool, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
+from ._masked import solve_masked
 
 
 def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
@@ -334,32 +335,3 @@ def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
             for k in range(directions.shape[0])
         ]
     )
-
-
-def solve_masked(matrix, right, mask):
-    """Solve for the masked unknowns, zero elsewhere; elimination without pivoting.
-
-    The matrix has a unit diagonal and is small (one row a constraint); unrolled so that
-    a batch of them stays elementwise.
-    """
-    number = right.shape[0]
-    rows = [
-        [
-            jnp.where(mask[i] & mask[k], matrix[i, k], jnp.asarray(float(i == k)))
-            for k in range(number)
-        ]
-        for i in range(number)
-    ]
-    values = [
-        jnp.where(mask[i], right[i], jnp.zeros_like(right[i])) for i in range(number)
-    ]
-    for p in range(number):
-        for i in range(p + 1, number):
-            factor = rows[i][p] / rows[p][p]
-            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[p], strict=True)]
-            values[i] = values[i] - factor * values[p]
-    for p in reversed(range(number)):
-        for k in range(p + 1, number):
-            values[p] = values[p] - rows[p][k] * values[k]
-        values[p] = values[p] / rows[p][p]
-    return jnp.stack(values)

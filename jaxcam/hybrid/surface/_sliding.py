@@ -26,13 +26,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .._types import RealScalar, State
-from ._normal import (
-    contact_multipliers,
-    field_in_force,
-    jet_along,
-    lie_series,
-    solve_masked,
-)
+from ._masked import solve_masked
+from ._normal import contact_multipliers, field_in_force, jet_along, lie_series
 from ._rounding import gap_rounding, rounding_of
 from ._switches import OnSides, surfaces
 
@@ -99,7 +94,9 @@ def slide_terms(mode: InMode, t, x) -> SlideTerms:
     beyond = [mode.beyond(k) for k in chosen]
     changes = [side.vector_field(t, x) - free for side in beyond]
     kicks = [
-        jnp.stack([d[i] if i in mode.jumps[k] else jnp.zeros(()) for i in range(len(x))])
+        jnp.stack(
+            [d[i] if i in mode.jumps[k] else jnp.zeros(()) for i in range(len(x))]
+        )
         for k, d in zip(chosen, changes, strict=True)
     ]
 
