@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 import jaxcam
 from jaxcam.hybrid import flow, Settings, SwitchedSystem
+from jaxcam.models import DryFrictionOscillator, load_system, save_system
 
 
 SHARP = Settings(tolerance=1e-13)
@@ -433,3 +434,25 @@ def test_derivatives_through_stick_and_slip():
         for i, unit in enumerate(np.eye(2)):
             ends = [end_of(system, state + s * 1e-5 * unit, t1).state for s in (1, -1)]
             assert largest(by_state[:, i], (ends[0] - ends[1]) / 2e-5) < 1e-6
+
+
+def test_the_model_is_this_system(tmp_path):
+    model = DryFrictionOscillator(omega=0.5, friction=0.6, static=1.1)
+    other = Rubbing(friction=0.6, drive=1.0, omega=0.5, static=1.1)
+    runs = [run_of(system, [0.3, 0.5], 20.0) for system in (model, other)]
+    assert largest(runs[0].switches.time, runs[1].switches.time) < 1e-13
+    assert np.array_equal(runs[0].switches.kind, runs[1].switches.kind)
+    save_system(model, tmp_path / "system.json")
+    assert eqx.tree_equal(load_system(tmp_path / "system.json"), model)
+    with pytest.raises(ValueError, match="holding"):
+        jaxcam.simulate(DryFrictionOscillator(static=0.9), [0.0, 0.0], 0.0, 1.0)
+
+
+def test_a_start_where_both_branches_leave_takes_the_given_side():
+    class Escaping(Rubbing):
+        def branch(self, t, state, sides):
+            return jnp.stack([state[1], self.friction * sides[0]])
+
+    run = run_of(Escaping(), [0.0, 0.0], 2.0)
+    assert int(run.switches.count) == 0
+    assert largest(run.final, [0.6, 0.6]) < 1e-12

@@ -25,6 +25,7 @@ from ..hybrid import HybridSystem
 from ._bilinear_oscillator import BilinearOscillator
 from ._bouncing_ball import BouncingBall
 from ._cam_follower import CamFollower
+from ._dry_friction_oscillator import DryFrictionOscillator
 from ._gear_backlash import GearBacklash
 from ._impact_oscillator import ImpactOscillator
 from ._restitution import ConstantRestitution, LinearInSpeed, PowerLawRestitution
@@ -41,6 +42,7 @@ _KNOWN: tuple[type, ...] = (
     BouncingBall,
     CamFollower,
     ConstantRestitution,
+    DryFrictionOscillator,
     EccentricCircle,
     FourierProfile,
     GearBacklash,

@@ -124,11 +124,6 @@ def seen_again(carried: LoopState, jets) -> LoopState:
         else:
             # a distance that an event has made zero stays zero
             gap = jnp.where((old.gap == 0) & ~carried.sliding[k - m], 0.0, new.gap)
-            fresh, all_of_it = new._replace(gap=gap), 1.0
-        after[k] = Jet(
-            *(
-                jnp.where(change >= all_of_it, a, b)
-                for a, b in zip(fresh, old, strict=True)
-            )
-        )
+            fresh, least = new._replace(gap=gap), 1.0
+        after[k] = Jet(*select(change >= least, fresh, old))
     return carried._replace(jets=tuple(after))
