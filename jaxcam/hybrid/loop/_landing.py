@@ -76,19 +76,25 @@ def land(
     x = select(lands, after, made.x)
     mode = _kept_contacts(functions, carried, lands, seen, landed, x)
     number = functions.m + functions.k
-    hit = [lands & (flown.constraint == k) for k in range(number)]
+
+    def reached():
+        return [lands & (flown.constraint == k) for k in range(number)]
+
     strikes, slides, leaves, stuck = lands, no, no, no
     if functions.k:
+        hit = reached()
         strikes = any_of(hit[: functions.m])
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
         mode = mode + sides.negative + sides.sliding
-    jets = functions.jets(seen, x, mode)
-    if functions.k:
+        jets = functions.jets(seen, x, mode)
         passed = past_surfaces(functions, carried, jets, hit, sides, approach, rounding)
         jets, stuck = passed.jets, passed.stuck
         slides, leaves = any_of(passed.slides), any_of(sides.leaves)
         flags = zip(mode[number:], passed.slides, strict=True)
         mode = mode[:number] + tuple(a | b for a, b in flags)
+    else:
+        jets = functions.jets(seen, x, mode)
+        hit = reached()
 
     # do the remaining impacts take negligible time?
     rebound = jnp.maximum(
