@@ -31,6 +31,7 @@ from .orbits import (
     orbits_near as orbits_near,
     periodic_orbit as periodic_orbit,
     periodic_orbits as periodic_orbits,
+    SingleShooting as SingleShooting,
     StickingOrbits as StickingOrbits,
 )
 from .predictors import PolynomialPredictor as PolynomialPredictor

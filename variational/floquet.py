@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import HybridSystem, Settings
+from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.surface import normal_acceleration, normal_velocity
 from jaxcam.parameters import as_arrays
 
@@ -70,7 +70,7 @@ def floquet_multipliers(
         >>> round(float(product.real), 6)  # the square of the restitution
         0.64
     """
-    if method == "product":
+    if method == "product" and not isinstance(system, SwitchedSystem):
         return _multipliers(as_arrays(system), orbit.state, orbit.pieces, orbit.sticks)
     made = turn_derivative(system, orbit, method=method, settings=settings)
     return eigenvalues(made.state, made.determinant)

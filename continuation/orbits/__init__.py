@@ -5,3 +5,4 @@ from ._periodic_orbit import periodic_orbit as periodic_orbit
 from ._periodic_seeds import orbits_near as orbits_near
 from ._periodic_sticking import StickingOrbits as StickingOrbits
 from ._shooting import ImpactingOrbits as ImpactingOrbits
+from ._single_shooting import SingleShooting as SingleShooting

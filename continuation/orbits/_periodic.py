@@ -4,7 +4,7 @@ from typing import Any
 
 from jaxtyping import ArrayLike, Float
 
-from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.parameters import as_arrays
 from variational import Orbit
 from variational.orbits import seed
@@ -13,6 +13,7 @@ from ..problem import Start
 from ._periodic_orbit import periodic_orbit
 from ._periodic_sticking import on_release
 from ._shooting import ImpactingOrbits
+from ._single_shooting import SingleShooting
 
 
 def periodic_orbits(
@@ -27,7 +28,8 @@ def periodic_orbits(
     on it.
 
     The problem depends on the motion: [`continuation.ImpactingOrbits`][] with the
-    impacts of the orbit, or [`continuation.StickingOrbits`][] if it sticks.
+    impacts of the orbit, [`continuation.StickingOrbits`][] if it sticks, or
+    [`continuation.SingleShooting`][] if the system has switching surfaces.
 
     Args:
         system: The system.
@@ -60,6 +62,8 @@ def periodic_orbits(
     base = None if system.period is None else float(system.period)
     length = float(orbit.period)
     number = 0 if base is None else round(length / base)
+    if isinstance(system, SwitchedSystem):
+        return SingleShooting.of(system, orbit, number, Settings(tolerance=1e-12))
     if orbit.sticks:
         if number == 0:
             raise ValueError(

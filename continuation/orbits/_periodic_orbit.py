@@ -36,6 +36,8 @@ _SAME = 1e-7
 """Two motions are equal if they differ by less than this, relative to their size."""
 _SAME_TIME = 1e-9
 """Two times are equal if they differ by less than this fraction of the period."""
+_SHORT = 1e-6
+"""Part of a period over which the direction of the motion is taken."""
 _CLOSED = 1e-9
 """A gap below this, relative to its size, counts as closed."""
 
@@ -52,9 +54,9 @@ def periodic_orbit(
     """Find a periodic orbit near a guess, stable or not, with any number of impacts.
 
     The impacts of the motion from the guess define the equations of multiple shooting;
-    if that fails, or the motion sticks, Newton's method is applied to the motion over
-    one period. Finally, the solution is simulated with the event loop, which must
-    return to it.
+    if that fails, the motion sticks, or the system has switching surfaces, Newton's
+    method is applied to the motion over one period. Finally, the solution is simulated
+    with the event loop, which must return to it.
 
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][], forced or not.
@@ -84,11 +86,6 @@ def periodic_orbit(
         >>> int(orbit.impacts.count)
         1
     """
-    if isinstance(system, SwitchedSystem):
-        raise ValueError(
-            "orbits that cross switching surfaces are not followed; solve "
-            "jaxcam.hybrid.flow(...).state - state = 0 with continuation.follow"
-        )
     settings = Settings(tolerance=1e-12) if settings is None else settings
     system = as_arrays(system)
     system.check()
@@ -100,7 +97,9 @@ def periodic_orbit(
     guess = real_array(guess, "guess")
     check_start(system, settings, jnp.asarray(float(t0)), guess, jnp.asarray(float(t0)))
     length = float(period) if base is None else number * base  # pyright: ignore
-    orbit, why = _by_shooting(system, guess, length, number, t0, settings)
+    orbit, why = None, "single shooting is used with switching surfaces"
+    if not isinstance(system, SwitchedSystem):
+        orbit, why = _by_shooting(system, guess, length, number, t0, settings)
     if orbit is None:
         orbit, later = _by_flow(system, guess, length, number, t0, settings)
         if orbit is None:
@@ -199,9 +198,9 @@ def _somewhere(system, t0):
     time = jnp.asarray(float(t0))
     for _ in range(20):
         gap = gaps(system, time, state)
-        which = int(jnp.argmin(gap))
-        if float(gap[which]) >= 0:
+        if not gap.shape[0] or float(jnp.min(gap)) >= 0:
             return np.asarray(state)
+        which = int(jnp.argmin(gap))
         slope = jax.grad(lambda x, w=which: gaps(system, time, x)[w])
         normal = slope(state)
         state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
@@ -288,30 +287,43 @@ def _touches(system, state, t0, length) -> bool:
 
 def _by_flow(system, guess, length, number, t0, settings):
     """Apply Newton's method to the motion over one period, by the event loop."""
-    if number == 0:
-        return None, "it needs a forcing period"
-    state, success = _root(
-        system, guess, jnp.asarray(float(t0)), jnp.asarray(length), settings
-    )
+    start, end = jnp.asarray(float(t0)), jnp.asarray(length)
+    state, found, success = _root(system, guess, start, end, settings, number == 0)
     if not bool(success):
         return None, "it did not converge"
-    return _confirmed(system, state, float(t0), length, settings)
+    return _confirmed(system, state, float(t0), float(found), settings)
 
 
 @eqx.filter_jit
-def _root(system, guess, t0, length, settings):
+def _root(system, guess, t0, length, settings, free: bool):
+    """Solve for the state, and for the period if it is `free`: the state then stays in
+    the plane through the guess that is perpendicular to the motion.
+    """
     sizes = component_sizes(system, t0, guess, length)
     # a component that remains zero has no size
     sizes = jnp.where(sizes > 0, sizes, 1.0)
 
+    def after(x, duration):
+        return flow(system, x, t0, t0 + duration, settings=settings).state
+
+    normal = (after(guess, _SHORT * length) - guess) / sizes
+
     def moved(y, _):
-        x = y * sizes
-        return (flow(system, x, t0, t0 + length, settings=settings).state - x) / sizes
+        x = y[: len(sizes)] * sizes
+        duration = y[-1] * length if free else length
+        off = (after(x, duration) - x) / sizes
+        if not free:
+            return off
+        return jnp.append(off, jnp.dot(normal, (x - guess) / sizes) / _SHORT)
 
     newton = optx.Newton(rtol=1e-9, atol=1e-9)
-    found = optx.root_find(moved, newton, guess / sizes, max_steps=30, throw=False)
+    begin = guess / sizes
+    begin = jnp.append(begin, 1.0) if free else begin
+    found = optx.root_find(moved, newton, begin, max_steps=30, throw=False)
     good = found.result == optx.RESULTS.successful
-    return found.value * sizes, good & jnp.all(jnp.isfinite(found.value))
+    good = good & jnp.all(jnp.isfinite(found.value))
+    duration = found.value[-1] * length if free else length
+    return found.value[: len(sizes)] * sizes, duration, good & (duration > 0)
 
 
 def _at(equations: Shooting, u, system, t0):

@@ -2,16 +2,13 @@
 
 from typing import Literal
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.parameters import as_arrays, pick, Where
 
 from ._orbit import Orbit
-from ._turn_derivative import builder, by_product, picked, TurnDerivative
+from ._turn_derivative import by_flow, by_product, picked, TurnDerivative
 
 
 Method = Literal["product", "flow"]
@@ -35,7 +32,7 @@ def monodromy(
             saltation matrices of the recorded events; "flow" differentiates the event
             loop. The first is accurate at every impact speed; the second loses one
             digit per decade of decreasing impact speed, because it has to locate the
-            impacts again.
+            impacts again. With switching surfaces, it is always the second.
         settings: Accuracy of "flow"; default a tolerance of 1e-12.
 
     Returns:
@@ -94,33 +91,10 @@ def turn_derivative(
     system = as_arrays(system)
     where = None if where is None else pick(where, system)
     values = picked(system, where)
-    if method == "product":
+    if method == "product" and not isinstance(system, SwitchedSystem):
         return by_product(
             system, values, where, orbit.state, orbit.pieces, orbit.sticks
         )
-    if settings is None:
-        settings = Settings(tolerance=1e-12)
-    settings = as_arrays(settings)
-    made = _by_flow(
-        system, values, where, orbit.state, orbit.time, orbit.period, settings
-    )
-    by_state, by_start, by_length, by_parameter = made
-    return TurnDerivative(
-        by_state,
-        by_length,
-        by_start,
-        by_parameter,
-        jnp.linalg.det(by_state),
-        jnp.asarray(jnp.nan),
-        orbit.sticks,
-    )
-
-
-@eqx.filter_jit
-def _by_flow(system, values, where, state, t0, period, settings):
-    build = builder(system, where)
-
-    def end(x, start, length, p):
-        return flow(build(p), x, start, start + length, settings=settings).state
-
-    return jax.jacfwd(end, argnums=(0, 1, 2, 3))(state, t0, period, values)
+    settings = Settings(tolerance=1e-12) if settings is None else settings
+    at = orbit.state, orbit.time, orbit.period
+    return by_flow(system, values, where, *at, settings, orbit.sticks)

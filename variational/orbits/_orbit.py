@@ -7,29 +7,29 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import HybridSystem, Settings, simulate
+from jaxcam.hybrid import HybridSystem, Settings, simulate, SwitchedSystem
 from jaxcam.hybrid.checks import refuse_tracers
-from jaxcam.hybrid.record import Contacts, impact_table, Impacts, Printed
+from jaxcam.hybrid.record import Contacts, impact_table, Impacts, Printed, Switches
 from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.hybrid.surface import gaps
 from jaxcam.parameters import real_array, VectorLike
 from jaxcam.tables import ShortTable
 
-from .._switching import refuse_switched
 from ._at_impact import after_and_speeds, ImpactStart, start_at_impact
 from ._closing import close, Knots
 from ._gap_sizes import gap_sizes
 from ._multipliers import eigenvalues
 from ._pieces import cut_turn, TurnPieces
-from ._turn_derivative import by_product, flown
+from ._turn_derivative import by_flow, by_product, flown
 
 
 class Event(NamedTuple):
-    """One event of an orbit: "impact", "stick" or "release", with its constraint."""
+    """One event of an orbit, with its constraint or switching surface."""
 
     kind: str
-    """"impact", "stick" or "release"."""
+    """"impact", "stick" or "release"; at a surface "cross", "slide" or "leave"."""
     constraint: int
-    """Index of the constraint."""
+    """Index of the constraint or of the surface."""
 
 
 class Orbit(Printed):
@@ -66,6 +66,8 @@ class Orbit(Printed):
     """The period, divided at its events."""
     sticks: bool = eqx.field(static=True)
     """Whether the orbit has sustained contact."""
+    switches: Switches | None = None
+    """The events at switching surfaces in one period; None without surfaces."""
 
     def _table(self) -> ShortTable:
         """Tabulate the impacts of one period, with a sentence on stability."""
@@ -73,8 +75,11 @@ class Orbit(Printed):
         sentence = (
             f"{'stable' if self.stable else 'unstable'} orbit of period "
             f"{float(self.period):.6g} s, impacts: {int(self.impacts.count)}, "
-            f"contacts: {int(self.contacts.count)}, multipliers of modulus {sizes}"
+            f"contacts: {int(self.contacts.count)}, "
         )
+        if self.switches is not None:
+            sentence += f"switches: {int(self.switches.count)}, "
+        sentence += f"multipliers of modulus {sizes}"
         return impact_table(self.impacts, sentence)
 
     @property
@@ -93,7 +98,7 @@ class Orbit(Printed):
 
         For completed chatter, only the impacts up to the completion are listed.
         """
-        return signature_of(self.impacts, self.contacts)
+        return signature_of(self.impacts, self.contacts, self.switches)
 
 
 def orbit_of(
@@ -110,6 +115,7 @@ def orbit_of(
 
     For an orbit without contact, the impacts are then refined as a boundary value
     problem, so that the impacts and multipliers are accurate at every impact speed.
+    With switching surfaces, the event loop is differentiated instead.
 
     Args:
         system: The system.
@@ -137,7 +143,6 @@ def orbit_of(
         ['impact']
     """
     refuse_tracers("orbit_of", "jaxcam.hybrid.flow", system, state, period, t0)
-    refuse_switched(system, "orbit_of")
     settings = Settings(tolerance=1e-12) if settings is None else settings
     if period is None:
         if system.period is None:
@@ -156,9 +161,14 @@ def orbit_of(
     sizes = component_sizes(system, t0, state, period)
     away = jnp.abs(turn.final - state)
     miss = float(jnp.max(jnp.where(away > 0, away / sizes, 0.0)))
-    start = start_at_impact(system, t0, state, period)
-    polished = int(contacts.count) == 0 and (
-        start is not None or int(impacts.count) > 0
+    start = None
+    if gaps(system, t0, state).shape[0]:
+        start = start_at_impact(system, t0, state, period)
+    switched = isinstance(system, SwitchedSystem)
+    polished = (
+        int(contacts.count) == 0
+        and not switched
+        and (start is not None or int(impacts.count) > 0)
     )
     if polished:
         heights = gap_sizes(system, t0, state, period)
@@ -172,11 +182,15 @@ def orbit_of(
         impacts, state = _rebuilt(system, knots, sides, t0, period)
     elif start is not None:
         raise ValueError(
-            "an orbit with contact cannot start at an impact; give a state in flight "
-            "or in contact"
+            "an orbit with contact or switching surfaces cannot start at an impact; "
+            "give a state in flight or in contact"
         )
     pieces, sticks = cut_turn(impacts, contacts, state, t0, t0 + period)
-    made = by_product(system, jnp.zeros(0), None, state, pieces, sticks)
+    if switched:
+        times = jnp.asarray(t0), jnp.asarray(period)
+        made = by_flow(system, jnp.zeros(0), None, state, *times, settings, sticks)
+    else:
+        made = by_product(system, jnp.zeros(0), None, state, pieces, sticks)
     return Orbit(
         state=state,
         time=jnp.asarray(t0),
@@ -188,6 +202,7 @@ def orbit_of(
         determinant=made.determinant,
         pieces=pieces,
         sticks=sticks,
+        switches=turn.switches,
     )
 
 
@@ -244,8 +259,15 @@ def _rebuilt(system, knots: Knots, sides, t0, period):
     return impacts, state
 
 
-def signature_of(impacts: Impacts, contacts: Contacts) -> tuple[Event, ...]:
-    """Return impacts, starts of contact and releases as one sequence in time."""
+_AT_SURFACE = ("cross", "slide", "leave")
+
+
+def signature_of(
+    impacts: Impacts, contacts: Contacts, switches: Switches | None = None
+) -> tuple[Event, ...]:
+    """Return impacts, starts of contact, releases and switches as one sequence in
+    time.
+    """
     found = []
     for k in range(int(impacts.count)):
         found.append((float(impacts.time[k]), 0, "impact", int(impacts.constraint[k])))
@@ -254,4 +276,7 @@ def signature_of(impacts: Impacts, contacts: Contacts) -> tuple[Event, ...]:
         found.append((float(contacts.start[k]), 1, "stick", which))
         if bool(contacts.released[k]):
             found.append((float(contacts.end[k]), 2, "release", which))
+    for k in range(0 if switches is None else int(switches.count)):
+        kind, which = _AT_SURFACE[int(switches.kind[k])], int(switches.surface[k])
+        found.append((float(switches.time[k]), 3, kind, which))
     return tuple(Event(kind, which) for _, _, kind, which in sorted(found))

@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxcam.hybrid import flow, Settings
 from jaxcam.hybrid.surface import field_in_force
-from jaxcam.parameters import Pick
+from jaxcam.parameters import as_arrays, Pick
 
 from .._flight import fly_linearised
 from ._pieces import TurnPieces
@@ -79,6 +80,33 @@ def by_product(system, values, where, state, pieces: TurnPieces, sticks):
         made.condition,
         sticks,
     )
+
+
+def by_flow(
+    system, values, where, state, t0, period, settings: Settings, sticks: bool
+) -> TurnDerivative:
+    """Differentiate the event loop over one period."""
+    made = _by_flow(system, values, where, state, t0, period, as_arrays(settings))
+    by_state, by_start, by_length, by_parameter = made
+    return TurnDerivative(
+        by_state,
+        by_length,
+        by_start,
+        by_parameter,
+        jnp.linalg.det(by_state),
+        jnp.asarray(jnp.nan),
+        sticks,
+    )
+
+
+@eqx.filter_jit
+def _by_flow(system, values, where, state, t0, period, settings):
+    build = builder(system, where)
+
+    def end(x, start, length, p):
+        return flow(build(p), x, start, start + length, settings=settings).state
+
+    return jax.jacfwd(end, argnums=(0, 1, 2, 3))(state, t0, period, values)
 
 
 @eqx.filter_jit

@@ -1,0 +1,250 @@
+"""Periodic orbits with any events, by single shooting with the event loop."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.hybrid.sizes import component_sizes
+from variational import Orbit
+
+from ..problem import AbstractProblem, StabilityKind, Start
+from ..special import FLIP, flip_direction
+
+
+# part of a period over which the direction of the motion is taken
+_SHORT = 1e-6
+
+
+class SingleShooting(AbstractProblem):
+    """Periodic orbits whose events may change along a branch.
+
+    The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or without
+    forcing the state and the period (s), shape `(n + 1,)`. The equation is that the
+    event loop returns to the state, and without forcing also that the state lies in a
+    plane perpendicular to the motion, which is updated at each point of a branch. One
+    program serves orbits with any numbers of impacts, crossings and sliding phases. The
+    Jacobian contains the saltation matrices of all events.
+
+    Where an impact grazes, the Jacobian is unbounded on one side; follow orbits of
+    systems without switching surfaces with [`continuation.ImpactingOrbits`][], which
+    locates grazing orbits exactly.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import BilinearOscillator
+        >>> system = BilinearOscillator(omega=1.5, amplitude=0.5, damping=0.2)
+        >>> orbit = continuation.periodic_orbit(system)
+        >>> found = continuation.branch(system, orbit, "omega", (1.4, 1.6))
+        >>> type(found.points[0].problem).__name__
+        'SingleShooting'
+    """
+
+    stability: ClassVar[StabilityKind] = "map"
+    """Multipliers on the unit circle mark bifurcations."""
+    normal_forms: ClassVar[bool] = False
+    """No normal-form coefficients are computed."""
+    costly: ClassVar[bool] = True
+    """Second derivatives take a long time to compile."""
+
+    parameters: HybridSystem
+    """The system."""
+    phase: Float[Array, ""]
+    """Phase of the forcing at the state (periods); zero without forcing."""
+    reference: Float[Array, " n"]
+    """State in the plane of the phase condition, shape `(n,)`."""
+    normal: Float[Array, " n"]
+    """Unit normal of that plane, shape `(n,)`."""
+    settings: Settings
+    """Accuracy of the runs."""
+    periods: int = eqx.field(static=True)
+    """Number of forcing periods after which the orbit repeats; 0 without forcing."""
+    turns: int = eqx.field(static=True, default=1)
+    """Number of turns of an orbit without forcing, 2 after a flip."""
+
+    @staticmethod
+    def of(
+        system: HybridSystem, orbit: Orbit, periods: int, settings: Settings
+    ) -> Start:
+        """Return the problem of an orbit, with its unknowns.
+
+        Args:
+            system: The system.
+            orbit: The orbit.
+            periods: Its period in forcing periods; 0 without forcing.
+            settings: Accuracy of the runs.
+
+        Returns:
+            A [`continuation.Start`][].
+        """
+        x, length = np.asarray(orbit.state), float(orbit.period)
+        phase = 0.0
+        if periods:
+            phase = float(orbit.time) / float(system.period)  # pyright: ignore
+        problem = SingleShooting(
+            system,
+            jnp.asarray(phase),
+            jnp.asarray(x),
+            jnp.ones(len(x)),
+            settings,
+            periods,
+        )
+        if periods:
+            return Start(problem, x)
+        u = np.append(x, length)
+        return Start(problem.refreshed(u, system), u)
+
+    def times(self, u, parameters) -> tuple[Array, Array]:
+        """Return the times (s) of the state and of its return."""
+        if not self.periods:
+            return jnp.zeros(()), u[-1]
+        period = jnp.asarray(parameters.period, dtype=jnp.float64)
+        return self.phase * period, (self.phase + self.periods) * period
+
+    def state(self, u) -> Float[Array, " n"]:
+        """Return the state among the unknowns, shape `(n,)`."""
+        return u if self.periods else u[:-1]
+
+    def residual(self, u, parameters) -> Float[Array, " u"]:
+        x = self.state(u)
+        times = self.times(u, parameters)
+        arrival = flow(parameters, x, *times, settings=self.settings)
+        off = jnp.where(arrival.code == 0, arrival.state - x, jnp.nan)
+        if self.periods:
+            return off
+        beside = jnp.dot(self.normal, (x - self.reference) / self._sizes(u, parameters))
+        return jnp.append(off, beside)
+
+    def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
+        """Return the monodromy matrix, without forcing that of the map on the plane.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            The matrix, shape `(n, n)`, or `(n - 1, n - 1)` without forcing.
+        """
+        n = self.reference.shape[0]
+        matrix = jacobian[:n, :n] + jnp.eye(n)
+        if self.periods:
+            return matrix
+        # the last column is the rate of change of the state
+        rate, normal = jacobian[:n, n], self.normal / self._sizes(u, parameters)
+        across = jnp.linalg.svd(normal[None])[2][1:].T
+        moved = matrix @ across
+        moved = moved - jnp.outer(rate, normal @ moved) / (normal @ rate)
+        return across.T @ moved
+
+    def scale(self, u, parameters) -> Float[Array, " u"]:
+        """Return the sizes of the components of the state, and the period.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            Shape `(u,)`.
+        """
+        sizes = self._sizes(u, parameters)
+        return sizes if self.periods else jnp.append(sizes, u[-1])
+
+    def _sizes(self, u, parameters):
+        start, end = self.times(u, parameters)
+        sizes = component_sizes(parameters, start, self.state(u), end - start)
+        sizes = jax.lax.stop_gradient(sizes)
+        return jnp.where(sizes > 0, sizes, 1.0)
+
+    def seen(self, u, parameters):
+        """Return the observed quantities; there are no monitors.
+
+        They are the period (s), the time (s) and the state at which the period is
+        begun, the number of impacts and, with forcing, the states at whole forcing
+        periods after that time, `(periods, n)`.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            As for `AbstractProblem.seen`.
+        """
+        x, (start, end) = self.state(u), self.times(u, parameters)
+        arrival = flow(parameters, x, start, end, settings=self.settings)
+        found = {
+            "period": end - start,
+            "time": start,
+            "state": x,
+            "impacts": arrival.impacts,
+        }
+        if self.periods:
+            found["stroboscopic"] = self._stroboscopic(x, start, end, parameters)
+        return {}, found
+
+    def _stroboscopic(self, x, start, end, parameters):
+        if self.periods == 1:
+            return x[None]
+        parts = jnp.arange(1, self.periods, dtype=jnp.float64) / self.periods
+
+        def later(part):
+            until = start + part * (end - start)
+            return flow(parameters, x, start, until, settings=self.settings).state
+
+        return jnp.concatenate([x[None], jax.vmap(later)(parts)])
+
+    # -- between compiled programs
+
+    def refreshed(self, u, parameters) -> "SingleShooting":
+        if self.periods:
+            return self
+        u = jnp.asarray(u)
+        normal = _direction(self, u, parameters)
+        # the sign is kept continuous for the test functions
+        normal = jnp.where(normal @ self.normal < 0, -normal, normal)
+        where: Callable[[Any], Any] = lambda one: (one.reference, one.normal)
+        return eqx.tree_at(where, self, (u[:-1], normal))
+
+    def check(self, point: Any) -> str | None:
+        if not self.periods and not point.state[-1] > 0:
+            return "the period is not positive"
+        return None
+
+    def transition(self, point: Any, at: Any) -> Start | None:
+        if point.kind != FLIP:
+            return None
+        direction = flip_direction(at.linearisation)
+        state = np.asarray(point.state)
+        if self.periods:
+            twice = eqx.tree_at(lambda one: one.periods, self, 2 * self.periods)
+            return Start(twice, state, point.parameter, np.append(direction, 0.0))
+        u = jnp.asarray(state)
+        normal = self.normal / self._sizes(u, point.problem.parameters)
+        across = np.linalg.svd(np.asarray(normal)[None])[2][1:].T
+        twice = eqx.tree_at(lambda one: one.turns, self, 2 * self.turns)
+        state = np.append(state[:-1], 2 * state[-1])
+        tangent = np.concatenate([across @ direction, [0.0, 0.0]])
+        return Start(twice, state, point.parameter, tangent)
+
+    @property
+    def signature(self) -> str:
+        return f"single shooting periods {self.periods} turns {self.turns}"
+
+    def with_signature(self, signature: str) -> AbstractProblem:
+        words = signature.split()
+        if words[:2] != ["single", "shooting"] or len(words) != 6:
+            return super().with_signature(signature)
+        numbers = int(words[3]), int(words[5])
+        return eqx.tree_at(lambda one: (one.periods, one.turns), self, numbers)
+
+
+@eqx.filter_jit
+def _direction(problem: SingleShooting, u, parameters) -> Float[Array, " n"]:
+    """Return the direction of the motion, relative to the sizes of the components."""
+    x, sizes = u[:-1], problem._sizes(u, parameters)
+    start = jnp.zeros(())
+    end = _SHORT * u[-1]
+    later = flow(parameters, x, start, end, settings=problem.settings).state
+    away = (later - x) / sizes
+    return away / jnp.linalg.norm(away)
