@@ -1,6 +1,6 @@
 """Periodic orbits with any events, by single shooting with the event loop."""
 
-from collections.abc import Callable
+import dataclasses
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -203,8 +203,7 @@ class SingleShooting(AbstractProblem):
         normal = _direction(self, u, parameters)
         # the sign is kept continuous for the test functions
         normal = jnp.where(normal @ self.normal < 0, -normal, normal)
-        where: Callable[[Any], Any] = lambda one: (one.reference, one.normal)
-        return eqx.tree_at(where, self, (u[:-1], normal))
+        return dataclasses.replace(self, reference=u[:-1], normal=normal)
 
     def check(self, point: Any) -> str | None:
         if not self.periods and not point.state[-1] > 0:
@@ -217,12 +216,12 @@ class SingleShooting(AbstractProblem):
         direction = flip_direction(at.linearisation)
         state = np.asarray(point.state)
         if self.periods:
-            twice = eqx.tree_at(lambda one: one.periods, self, 2 * self.periods)
+            twice = dataclasses.replace(self, periods=2 * self.periods)
             return Start(twice, state, point.parameter, np.append(direction, 0.0))
         u = jnp.asarray(state)
         normal = self.normal / self._sizes(u, point.problem.parameters)
         across = np.linalg.svd(np.asarray(normal)[None])[2][1:].T
-        twice = eqx.tree_at(lambda one: one.turns, self, 2 * self.turns)
+        twice = dataclasses.replace(self, turns=2 * self.turns)
         state = np.append(state[:-1], 2 * state[-1])
         tangent = np.concatenate([across @ direction, [0.0, 0.0]])
         return Start(twice, state, point.parameter, tangent)
@@ -235,8 +234,7 @@ class SingleShooting(AbstractProblem):
         words = signature.split()
         if words[:2] != ["single", "shooting"] or len(words) != 6:
             return super().with_signature(signature)
-        numbers = int(words[3]), int(words[5])
-        return eqx.tree_at(lambda one: (one.periods, one.turns), self, numbers)
+        return dataclasses.replace(self, periods=int(words[3]), turns=int(words[5]))
 
 
 @eqx.filter_jit
