@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 # Fractions of the largest singular value, with columns of unit length, below which a
 # combination is certainly, or possibly, due to rounding
-_BLIND, _DOUBTFUL = 1e-6, 3e-3
+_BLIND, _DOUBTFUL = 4e-6, 3e-3
 # Growth of information that comes from the states alone, if they are held a hundred
 # times as firmly
 _GROWS = 10.0
