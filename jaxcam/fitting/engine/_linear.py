@@ -106,9 +106,7 @@ def linear_pieces(
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
     found = score_all(sensors, part.value, seen)
     weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
-    information, slope = _normal(
-        rows, weight * found.information, weight * found.score
-    )
+    information, slope = _normal(rows, weight * found.information, weight * found.score)
     flown_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
 
     pp, p, rested_cost = _linear_contacts(model_at, pieces, extras, origin)
