@@ -56,7 +56,7 @@ def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> Hybri
             continue
         leaves = _leaves(system)
         if name == _SPEED and name in leaves and _in_rpm(system):
-            raise ValueError(f"--set {assignment}: give the speed in rpm, as --speed.")
+            raise ValueError(f"--set {assignment}: use --speed, with the speed in rpm.")
         if name not in leaves:
             raise ValueError(
                 f"--set {assignment}: there is no parameter {name!r}; the parameters "

@@ -91,7 +91,7 @@ def rest_table(found: list[Rests]) -> Table:
     return table
 
 
-HEADINGS = ("run", "", "per turn", "from (rad)", "to (rad)", "share of time")
+HEADINGS = ("run", "", "per cycle", "from (rad)", "to (rad)", "fraction of time")
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:

@@ -136,7 +136,7 @@ class CamFollower(AbstractCamDriven):
         return self.inertia * curvature, jnp.zeros_like(slope), spring
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(
             speed=self.speed, inertia=self.inertia, stiffness=self.stiffness
         )

@@ -229,7 +229,7 @@ def _far(trials: Trials) -> Caveat:
 
 def _tie(best: Trial, other: Trial) -> Caveat:
     names = tuple(sorted(other.names))
-    written = ("+".join(names) or "none").replace("_", " ")
+    written = ("+".join(names) or "the textbook model").replace("_", " ")
     return Caveat(
         Reason.TIE,
         f"These recordings cannot distinguish {listed(sorted(best.names))} from "
