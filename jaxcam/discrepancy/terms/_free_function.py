@@ -152,8 +152,8 @@ class FreeFunction(Term):
     def at(self, argument, direction: Any = 0.0):
         """Return the function without its factor.
 
-        A sum of sines is constant beyond the ends of its range. A form continues there
-        by a share of the range, because some velocities are outside.
+        A sum of sines is constant beyond the ends of its range. A form continues beyond
+        them over a fraction of the range, because some velocities are outside.
 
         **Arguments:** the argument, and the direction of motion.
         """
