@@ -22,8 +22,9 @@ _SETTLE = 20.0
 class Intervals(NamedTuple):
     """Contact intervals, each from its start to the release.
 
-    - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped. -
-      `turns`: number of cam turns examined.
+        - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped.
+    - `turns`: number of cam turns examined.
+
     - `share`: fraction of the time in contact, including intervals truncated by the
       ends of the recording.
     """

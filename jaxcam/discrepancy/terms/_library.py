@@ -140,7 +140,7 @@ class RestitutionVelocity(Term):
 
 
 class CamProfileError(Term):
-    """A cam that is out of round by `run cos(2 phi + lead)`."""
+    """A cam that is out of round by `run cos(2 phi + lead)`; phi is the drive angle."""
 
     name: ClassVar[str] = "cam_profile_error"
     sentence: ClassVar[str] = "an error of the cam profile, twice per revolution"
@@ -187,10 +187,10 @@ class ExternalVibration(Term):
 
 
 class DriveRipple(Term):
-    """A drive whose speed varies with its own angle, `w (1 + eps cos(phi - psi))`.
+    """A drive whose speed varies with its angle phi, `w (1 + eps cos(phi - psi))`.
 
-    The ripple is found in the channel of the drive itself; the motion is computed from
-    that channel in any case.
+    The ripple is identified in the channel of the drive angle. The motion is computed
+    from that channel, with or without this term.
     """
 
     name: ClassVar[str] = "drive_ripple"

@@ -98,8 +98,8 @@ def return_times(samples: Samples) -> np.ndarray:
         samples: Samples of a section.
 
     Returns:
-        Times (s, or iterations of a map), shape `(lanes, keep - 1)`; NaN where a point
-            is missing.
+        Times (s, or iterations of a map), shape `(motions, keep - 1)`; NaN where a
+            point is missing.
 
     Examples:
         >>> from jaxcam import sweeps
