@@ -53,7 +53,7 @@ class CamFollower(AbstractCamDriven):
     spring_hook_x: jax.Array = parameter(-0.031)
     """x-coordinate of the suspension point of the spring, x_A (m)."""
     spring_elongation: jax.Array = parameter(0.173)
-    """y_A - d_0 - d_1 (m)."""
+    """y_A - d_0 - d_1 in the notation of the thesis (m)."""
     spring_half_height: jax.Array = parameter(0.021)
     """d in the spring torque (m). The half height that determines the contact angle
     belongs to the profile, so that both can be fitted separately.

@@ -97,7 +97,8 @@ def _gain(inside, pull, spread, value) -> float:
     used = spread > 0
     spread, value = spread[used], value[used]
     inside, pull = inside[np.ix_(used, used)], pull[used]
-    # in units of the prior errors; rounding must not make information negative
+    # in units of the prior standard deviations; rounding must not make information
+    # negative
     values, vectors = np.linalg.eigh(inside * np.outer(spread, spread))
     values = 1 + np.maximum(values, 0.0)
     here = value / spread

@@ -1,4 +1,4 @@
-"""Sample any Poincare section, one trajectory at a time."""
+"""Sample any Poincaré section, one trajectory at a time."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from ._system_section import AbstractSystemSection
 
 
 class PoincareSection(AbstractSystemSection):
-    """Poincare section: crossings of `function(t, state) = 0`, with their times.
+    """Poincaré section: crossings of `function(t, state) = 0`, with their times.
 
     Motions are computed one after the other by
     [`jaxcam.simulate`][jaxcam.hybrid.simulate], which is suitable for dozens of motions
