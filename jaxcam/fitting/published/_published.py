@@ -97,7 +97,8 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    The method is Levenberg-Marquardt (MINPACK), with larger errors far from the data.
+    The method is Levenberg-Marquardt (MINPACK). As long as the model is far from the
+    data, larger errors are assumed.
 
     Args:
         model: A system, or a module that contains one, at the nominal values.
