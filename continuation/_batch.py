@@ -163,7 +163,7 @@ def follow_batch(
     low, high = checked_bounds(bounds, name)
     starts = np.asarray(states, float)
     if starts.ndim != 2 or not len(starts):
-        raise ValueError("states must have shape (lanes, n), one start for each branch")
+        raise ValueError("states must have shape (branches, n), one row each")
     if points < 2:
         raise ValueError(f"points is {points}; a branch needs at least 2")
     lanes = len(starts)

@@ -111,7 +111,7 @@ def simulate(
     if engine == "diffeqsolve":
         if isinstance(system, SwitchedSystem):
             raise ValueError(
-                'engine="diffeqsolve" knows no switching surfaces; use engine="loop"'
+                'engine="diffeqsolve" has no switching surfaces; use engine="loop"'
             )
         if traced:
             raise ValueError(

@@ -234,6 +234,6 @@ def _tie(best: Trial, other: Trial) -> Caveat:
         Reason.TIE,
         f"These recordings cannot distinguish {listed(sorted(best.names))} from "
         f"{written}: the BIC differs by only {other.bic - best.bic:.1f}. Record "
-        "larger and smaller bounces, and speeds further apart.",
+        "motions of larger and smaller amplitude, and speeds further apart.",
         names,
     )
