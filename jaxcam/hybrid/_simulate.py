@@ -111,7 +111,8 @@ def simulate(
     if engine == "diffeqsolve":
         if isinstance(system, SwitchedSystem):
             raise ValueError(
-                'engine="diffeqsolve" has no switching surfaces; use engine="loop"'
+                'engine="diffeqsolve" does not support switching surfaces; use '
+                'engine="loop"'
             )
         if traced:
             raise ValueError(
