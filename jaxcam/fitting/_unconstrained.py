@@ -56,7 +56,8 @@ def unconstrained(
     the squares of the singular values, with every column of J at unit length.
 
     **Arguments:** names and `information` of the parameters in units of their `scale`;
-    `firmer` returns the same matrix with the eliminated states held more firmly.
+    `firmer` returns the same matrix with a stronger regularisation of the eliminated
+    states.
     """
     diagonal = np.diag(information)
     dead = ~(diagonal > 0)

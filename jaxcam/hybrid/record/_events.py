@@ -86,8 +86,9 @@ class Switches(Printed):
     surface: Int[AnyArray, " k"]
     """Index of the surface, shape `(k,)`."""
     direction: Float[AnyArray, " k"]
-    """+1 where the switching function rises through the switch, -1 where it falls,
-    shape `(k,)`."""
+    """+1 where the switching function is increasing, -1 where it is decreasing, shape
+    `(k,)`.
+    """
     count: Int[AnyArray | np.integer, ""]
     """Number of crossings."""
 

@@ -178,7 +178,7 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
     """Return q with F_s = F - sum q_k D_k over the constraints in contact.
 
     With one constraint, q = a. The contact force is compressive while q < 0, and the
-    constraint releases when q rises through zero. For constraints that are not in
+    contact ends when q rises through zero. For constraints that are not in
     contact, q is zero.
     """
     acceleration = normal_acceleration(system, t, x)
@@ -333,8 +333,8 @@ def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
 def _solve_masked(matrix, right, mask):
     """Solve for the masked unknowns, zero elsewhere; elimination without pivoting.
 
-    The matrix has a unit diagonal and is small (one row a constraint); unrolled so that
-    a batch of them stays elementwise.
+    The matrix has a unit diagonal and is small (one row per constraint). The
+    elimination is unrolled, so that a batch is computed elementwise.
     """
     number = right.shape[0]
     rows = [

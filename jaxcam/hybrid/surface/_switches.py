@@ -1,7 +1,8 @@
 """Derive the motion relative to switching surfaces.
 
-The distance of a surface is its switching function on the side of the motion, plus its
-hysteresis: positive before a crossing, zero at it, as a gap is at an impact.
+The distance to a surface is its switching function, positive on the side of the motion,
+plus its hysteresis. It is positive before a crossing and zero at the crossing, as a gap
+is at an impact.
 """
 
 from typing import Any
