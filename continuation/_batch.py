@@ -24,7 +24,9 @@ from .special import locate, test_values
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Branches stored side by side; rows of a branch beyond its `count` are padding."""
+    """Branches in arrays of equal length; rows beyond the `count` of a branch are
+    padding.
+    """
 
     states: np.ndarray
     """States, shape `(lanes, points, n)`."""
@@ -122,8 +124,8 @@ def follow_batch(
     """Follow many branches in one compiled program, each with its own step lengths.
 
     Branches differ in their starts, in the values of other parameters, or both.
-    Features that need decisions in Python (transitions, admissibility and updated
-    references) are not available.
+    Features that need decisions in Python (transitions, admissibility and updated phase
+    conditions) are not available.
 
     Args:
         problem: The problem.
@@ -141,7 +143,7 @@ def follow_batch(
             counts as complete.
 
     Returns:
-        A `Batch`; its `reason` tells whether a branch failed.
+        A `Batch`; its `reasons` state how each branch ended.
 
     Raises:
         ValueError: Shapes are inconsistent, or the algorithm cannot run in a batch.
@@ -161,7 +163,7 @@ def follow_batch(
     low, high = checked_bounds(bounds, name)
     starts = np.asarray(states, float)
     if starts.ndim != 2 or not len(starts):
-        raise ValueError("states must have shape (lanes, n), one start for each branch")
+        raise ValueError("states must have shape (branches, n), one row each")
     if points < 2:
         raise ValueError(f"points is {points}; a branch needs at least 2")
     lanes = len(starts)

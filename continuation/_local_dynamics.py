@@ -11,8 +11,8 @@ StabilityKind = Literal["equilibrium", "map", "none"]
 
 
 class LocalDynamics(NamedTuple):
-    """The vector field or map around a solution, with the eigenvalues of the
-    problem.
+    """The vector field or map around a solution, which has the eigenvalues of the
+    linearisation.
     """
 
     at: Array

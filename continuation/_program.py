@@ -42,7 +42,9 @@ def residual_at(problem: AbstractProblem, leaf: int, z):
 
 
 def scale_at(problem: AbstractProblem, leaf: int, z, width):
-    """Return sizes (n+1,) such that the norm of z / size is the length of a step."""
+    """Return scales (n+1,) such that the norm of dz / scale is the length of a step
+    dz.
+    """
     parameters = with_leaf(problem.parameters, leaf, z[-1])
     u = z[:-1]
     size = problem.scale(u, parameters) * jnp.sqrt(jnp.asarray(u.size, u.dtype))

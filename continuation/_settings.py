@@ -9,10 +9,10 @@ import numpy as np
 class BranchSettings(eqx.Module):
     """Accuracy and step control of a branch.
 
-    Lengths along a branch are measured with the parameter in units of the width of its
-    bounds and the state in units of `problem.scale` (root mean square over its
-    components). For example, a step of 0.01 in the parameter is a hundredth of the
-    width of the bounds.
+    The square of the length of a step is the mean square change of the state, in units
+    of `problem.scale`, plus the square of the change of the parameter, in units of the
+    width of its bounds. For example, a step of 0.01 in the parameter alone is a
+    hundredth of the width of the bounds.
 
     Examples:
         >>> import continuation

@@ -1,4 +1,4 @@
-"""Convert the systems that `follow` accepts instead of a problem."""
+"""Convert a system and its orbit, which `follow` accepts instead of a problem."""
 
 from typing import Any
 

@@ -22,8 +22,9 @@ class AbstractAlgorithm(eqx.Module):
 
     @abc.abstractmethod
     def normal(self, tangent: Float[Any, " n+1"]) -> Float[Any, " n+1"]:
-        """Return the normal of the corrector's plane, given the tangent; both are
-        scaled.
+        """Return the normal of the corrector's plane, given the tangent.
+
+        The components of both are divided by the scales of the problem.
 
         Args:
             tangent: Tangent of the branch, `(n+1,)`; a NumPy array, or traced in a

@@ -69,6 +69,6 @@ assert min(abs(np.array(found) - fold)) < 1e-9
 figure = branch_diagram(
     branch,
     x_label=("position of the wall", "-"),
-    y_label=("position once a period", "-"),
+    y_label=("stroboscopic position", "-"),
 )
 plt.show()

@@ -92,7 +92,7 @@ branch_diagram(
     branch,
     left,
     x_label=("position of the wall", "-"),
-    y_label=("position once a period", "-"),
+    y_label=("stroboscopic position", "-"),
 )
 drawn = multipliers(along, right, reach=2.0)
 # -

@@ -147,7 +147,10 @@ def test_interrupted_run_says_so(monkeypatch):
     monkeypatch.setattr(package, "simulate", interrupted)
     found = jaxcam(*BALL, ok=False)
     assert found.exit_code == 130
-    assert found.stderr == "Stopped by Ctrl-C before the end; run it again to finish.\n"
+    assert (
+        found.stderr
+        == "Stopped by Ctrl-C before the end; run the command again to finish.\n"
+    )
 
 
 @pytest.mark.parametrize(

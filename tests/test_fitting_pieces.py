@@ -2,15 +2,18 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxcam.fitting import fit, Parameter, Problem, Sensor
 from jaxcam.fitting.engine._linearise import Layout
 from jaxcam.fitting.engine._model import Model
 from jaxcam.fitting.engine._pieces import _PIECE, spans
-from jaxcam.fitting.engine._predict import contact_state
+from jaxcam.fitting.engine._predict import contact_state, fly
+from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall
 from jaxcam.recordings import Recording, segment
 
@@ -98,3 +101,60 @@ def test_a_model_to_first_order_has_the_derivatives_of_the_model():
     assert np.array(direct(origin)) == pytest.approx(np.array(expanded(origin)))
     slopes = (np.array(jax.jacfwd(f)(origin)) for f in (direct, expanded))
     assert next(slopes) == pytest.approx(next(slopes), rel=1e-14)
+
+
+class Spring(HybridSystem):
+    """An undamped oscillator that touches nothing."""
+
+    stiffness: jax.Array = eqx.field(default=4.0, converter=jnp.asarray)
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -self.stiffness * state[0]])
+
+    def gap(self, t, state):
+        return state[0] + 10.0
+
+    def impact(self, t, state):
+        return state
+
+
+def _ends(stiffness, substeps):
+    model = Model(Spring(stiffness), {"x": Sensor(0, noise=1e-3)})
+    start, step, still = jnp.array([1.0, 0.0]), jnp.asarray(0.1), jnp.zeros(10)
+    return fly(model, start, jnp.asarray(0.0), step, still, still, substeps)
+
+
+def test_substeps_refine_the_values_and_leave_the_derivatives():
+    """Four substeps leave some 1/256 of the error, at the end and on the way.
+
+    The exact motion is cos(w t) with w = 2 1/s.
+    """
+    angle = 0.2 * jnp.arange(1.0, 11.0)
+    errors = []
+    for substeps in (1, 4):
+        end, nodes = _ends(jnp.asarray(4.0), substeps)
+        exact = jnp.array([jnp.cos(angle[-1]), -2 * jnp.sin(angle[-1])])
+        errors.append(jnp.abs(end - exact))
+        on_the_way = jnp.max(jnp.abs(nodes.right[:, 0] - jnp.cos(angle)))
+        slopes = jnp.max(jnp.abs(nodes.right_rate[:, 0] + 2 * jnp.sin(angle)))
+        assert on_the_way < 3e-5 / substeps**4 and slopes < 1e-4 / substeps**4
+    ratio = errors[0] / errors[1]
+    assert np.all((ratio > 150) & (ratio < 300))
+    slopes = [jax.jacfwd(lambda k, n=n: _ends(k, n))(jnp.asarray(4.0)) for n in (1, 4)]
+    for one, two in zip(*map(jax.tree.leaves, slopes), strict=True):
+        assert np.allclose(one, two, rtol=0, atol=1e-15)
+
+
+def test_a_long_flight_is_divided_into_substeps_instead_of_more_steps():
+    """A frequency error adds up over the pieces: the fit is as good as its noise."""
+    rng, time = np.random.default_rng(3), 0.02 * np.arange(4000)
+    height = np.cos(2.0 * time) + 1e-4 * rng.standard_normal(len(time))
+    parts = segment(Recording("free", time, {"x": height}), "x", -10.0 + 0 * time)
+    model = Model(Spring(4.0), {"x": Sensor(0, noise=1e-4)})
+    stiffness = Parameter("stiffness", lambda m: m.system.stiffness)
+    problem = Problem.build(model, [parts], [stiffness])
+    assert problem.pieces.angle.shape[-1] <= 20 and problem.pieces.substeps > 1
+    found = fit(problem)
+    assert found.converged
+    assert abs(found["stiffness"].value - 4.0) < 4 * found["stiffness"].stderr
+    assert found["stiffness"].stderr < 1e-6

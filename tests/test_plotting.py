@@ -206,7 +206,7 @@ def test_phase_portrait_has_jumps_and_stroboscopic_points(ball):
     (rest,) = [each for each in ax.lines if each.get_marker() == "s"]
     np.testing.assert_array_equal(rest.get_xydata(), [[0.0, 0.0]])
     # 0, 0.25, 0.5 and 0.75 s
-    assert len(line(ax, "once per period").get_xdata()) == 4
+    assert len(line(ax, "stroboscopic points").get_xdata()) == 4
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("height (m)", "velocity (m/s)")
 
 
@@ -215,11 +215,11 @@ def test_phase_portrait_turns_round_and_takes_axes(ball, walls):
     figure = plotting.phase_portrait(ball, ax, components=(1, 0), period=0.1)
     assert figure is own
     assert ax.get_xlabel() == "velocity (m/s)"
-    assert len(line(ax, "once per period").get_xdata()) == 9
+    assert len(line(ax, "stroboscopic points").get_xdata()) == 9
     # no forcing, no points
     (ax,) = plotting.phase_portrait(walls).axes
     labels = [each.get_label() for each in ax.lines]
-    assert "once per period" not in labels
+    assert "stroboscopic points" not in labels
 
 
 def test_impact_map_has_a_point_for_every_pair(ball):
@@ -260,7 +260,7 @@ def test_figures_of_a_simulated_trajectory(ball):
         drawn.gap[flying, 0], ball.gap(drawn.time[flying]), atol=1e-9
     )
     (ax,) = plotting.phase_portrait(simulated).axes
-    assert len(line(ax, "once per period").get_xdata()) == 4
+    assert len(line(ax, "stroboscopic points").get_xdata()) == 4
     _, speed = plotting.impact_return_map(simulated).axes
     assert len(line(speed, "constraint 0").get_xdata()) == number - 1
 
@@ -384,7 +384,7 @@ def test_residual_by_mode_has_a_row_for_every_mode(comparison):
     assert flight.get_ylabel() == "residual (mrad)"
     assert impact.get_ylabel() == "residual (rad/s)"
     assert impact.get_xlabel() == "time (s)"
-    assert shares.get_xlabel() == "share (%)"
+    assert shares.get_xlabel() == "fraction (%)"
     assert len(line(flight, "run1").get_xdata()) == 200
     assert len(line(flight, "run2").get_xdata()) == 300
     # the bars are all of the samples, and agree with what noise alone would give

@@ -45,7 +45,7 @@ def test_the_cobweb_lies_on_the_map():
     figure = plotting.cobweb(
         lambda x: variational.nordmark_map(x, mu, lam), 0.1, 30, skip=200, edge=mu
     )
-    motion = next(x for x in figure.axes[0].lines if x.get_label() == "motion")
+    motion = next(x for x in figure.axes[0].lines if x.get_label() == "orbit")
     x, y = (np.asarray(d) for d in motion.get_data())
     # every second corner is on the map, the others on the diagonal
     expected = np.asarray(variational.nordmark_map(x[1::2], mu, lam))

@@ -1,4 +1,4 @@
-"""Linearise the Poincare map of a smooth flow."""
+"""Linearise the Poincaré map of a smooth flow."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ def poincare_derivative(
     *,
     tolerance: float = 1e-11,
 ) -> Float[Array, "n n"]:
-    """Return the derivative of the Poincare map at a point of a periodic motion.
+    """Return the derivative of the Poincaré map at a point of a periodic motion.
 
     It is the monodromy matrix projected onto the section along the flow (thesis, eq.
     2.14). Its eigenvalues are zero, in the direction of the flow, and the nontrivial

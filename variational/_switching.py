@@ -61,7 +61,7 @@ def switching_saltation(
 
 
 def refuse_switched(system: HybridSystem, name: str) -> None:
-    """Raise `ValueError` for a function that knows no switching surfaces."""
+    """Raise `ValueError` in a function that does not support switching surfaces."""
     if isinstance(system, SwitchedSystem):
         raise ValueError(
             f"{name} does not include switching surfaces; differentiate "

@@ -59,7 +59,7 @@ class ImpactingOrbits(AbstractProblem):
     def __check_init__(self):
         if self.periods == 0 and not self.constraints:
             raise ValueError(
-                "an orbit without forcing and impacts has no Poincare section; follow "
+                "an orbit without forcing and impacts has no Poincaré section; follow "
                 "it as a smooth limit cycle"
             )
 

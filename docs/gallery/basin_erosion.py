@@ -23,6 +23,6 @@ words = [*names[large], "others"]
 with style():
     figure, ax = plt.subplots()
     ax.stackplot(found.values, *(100 * np.array(bands)), labels=words, alpha=0.85)
-    ax.set(xlabel="position of the wall (–)", ylabel="part of the states (%)")
+    ax.set(xlabel="position of the wall (–)", ylabel="fraction of states (%)")
     ax.set(xlim=(0.0, 0.4), ylim=(0, 100))
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)

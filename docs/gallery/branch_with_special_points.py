@@ -19,5 +19,5 @@ branch = continuation.branch(
 figure = branch_diagram(
     branch,
     x_label=("position of the wall", "–"),
-    y_label=("position once a period", "–"),
+    y_label=("stroboscopic position", "–"),
 )

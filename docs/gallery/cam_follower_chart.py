@@ -1,5 +1,5 @@
-"""Bifurcations of the cam-follower in the plane of speed and restitution: the orbit
-with one impact per cycle is stable between its fold and its flip, and chatter is
+"""Bifurcations of the cam-follower against speed and coefficient of restitution: the
+orbit with one impact per cycle is stable between its fold and its flip, and chatter is
 complete between detachment and interruption."""
 
 import equinox as eqx

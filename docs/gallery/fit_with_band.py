@@ -1,5 +1,5 @@
-"""A recorded swing and the fitted model: the residual stays within a band of plus or
-minus twice the noise, so the model explains the recording."""
+"""A recorded swing and the fitted model: nearly all residuals lie within a band of plus
+or minus twice the noise, so the model explains the recording."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -47,5 +47,8 @@ rows = np.rint(left.time / 0.01).astype(int)
 fitted = np.full(len(recording), np.nan)
 fitted[rows] = recording["angle_rad"][rows] - left.value
 figure = compare_recording(
-    recording, {"by the fit": fitted}, channel="angle_rad", noise=sensor.noise
+    recording,
+    {"with fitted parameters": fitted},
+    channel="angle_rad",
+    noise=sensor.noise,
 )

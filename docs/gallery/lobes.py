@@ -1,5 +1,6 @@
 """The map close to the interruption of chatter: infinitely many lobes, each a smaller
-copy of the previous one, scaled by two powers of the coefficient of restitution."""
+copy of the previous one, with two scale factors set by the coefficient of
+restitution."""
 
 from jaxcam.plotting import beta_lobes
 

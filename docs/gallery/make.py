@@ -28,9 +28,11 @@ PAGE = HERE.parent / "gallery.md"
 OUT = HERE
 # of the figures on the page, from top to bottom
 ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
+# where the name of a script alone would lack a hyphen
+TITLES = {"cam_follower_chart": "Cam-follower chart", "stick_slip": "Stick-slip"}
 # dots per inch
 DOTS = 130
-# number of colours of a picture, small enough for a small file
+# number of colours of a picture, few enough for a small file
 COLOURS = 64
 
 _TOP = """---
@@ -98,7 +100,7 @@ def page() -> str:
         name: dict(
             name=name,
             anchor=name.replace("_", "-"),
-            title=name.replace("_", " ").capitalize(),
+            title=TITLES.get(name, name.replace("_", " ").capitalize()),
             caption=caption(name),
         )
         for name in ORDER

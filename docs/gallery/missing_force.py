@@ -1,5 +1,5 @@
 """The force that a model lacks, identified from a recording: a polynomial in the
-velocity is fitted together with the spring, here to a pendulum swing with air drag."""
+velocity is fitted together with the stiffness, here to a pendulum with air drag."""
 
 import jax
 import jax.numpy as jnp
@@ -59,6 +59,6 @@ with style():
         v, force - 2 * error, force + 2 * error, color=IMPACT, alpha=0.3, lw=0
     )
     ax.plot(v, force, color=IMPACT, label="fitted, ± 2 standard errors")
-    ax.plot(v, jax.vmap(real.missing)(v), "--", color=SECTION, lw=1, label="truth")
+    ax.plot(v, jax.vmap(real.missing)(v), "--", color=SECTION, lw=1, label="exact")
     ax.set(xlabel="velocity (rad/s)", ylabel="missing acceleration (rad/s²)")
     ax.legend()

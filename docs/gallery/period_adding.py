@@ -16,6 +16,6 @@ depth = np.repeat(values, 150)
 with style():
     figure, ax = plt.subplots()
     ax.plot(depth, np.ravel(settled), ".", ms=1.0, mew=0, alpha=0.35, color=FLIGHT)
-    ax.set(xlabel="depth beyond grazing (–)", ylabel="state once per period (–)")
+    ax.set(xlabel=r"parameter $\mu$ (–)", ylabel="stroboscopic state (–)")
     ax.axhline(0, color="0.4", lw=0.8, ls=":")
     ax.text(0.12, 0.004, "no impact below", ha="right", fontsize="small")

@@ -17,4 +17,4 @@ states = stroboscope(system, starts, turns=400, skip=100).states.reshape(-1, 2)
 with style():
     figure, ax = plt.subplots()
     ax.plot(*states.T, ".", ms=0.9, mew=0, color=FLIGHT, rasterized=True)
-    ax.set(xlabel="position once a period (–)", ylabel="velocity once a period (–)")
+    ax.set(xlabel="stroboscopic position (–)", ylabel="stroboscopic velocity (–)")

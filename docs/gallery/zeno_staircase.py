@@ -22,8 +22,8 @@ with style():
     top.plot(times, trajectory.at(times)[:, 0], color=FLIGHT)
     top.set_ylabel("height (m)")
     below.step(hits, np.arange(1, len(hits) + 1), where="post", color=IMPACT)
-    below.set(xlabel="time (s)", ylabel="impacts so far (–)")
+    below.set(xlabel="time (s)", ylabel="number of impacts (–)")
     for ax in (top, below):
         ax.axvspan(rest, 2.8, color=CONTACT, alpha=0.3, lw=0)
     top.text(rest, 0.28, " at rest", va="top")
-    below.text(rest, 55, f"they accumulate at {rest:.4f} s  ", ha="right")
+    below.text(rest, 55, f"accumulation point: {rest:.4f} s  ", ha="right")

@@ -12,8 +12,9 @@ class Ready(NamedTuple):
     state: tuple[float, ...] | None
     """None is the release point."""
     turns: float | None
-    """Periods of the forcing, or else s."""
+    """Default number of forcing periods; None for a duration in seconds."""
     duration: float
+    """Default duration (s), if `turns` is None."""
 
 
 SYSTEMS = {

@@ -38,7 +38,7 @@ def demo(
     ] = True,
     branches: Annotated[
         bool,
-        typer.Option(help=("Also continue two orbits of the thesis rig.")),
+        typer.Option(help=("Also continue two orbits of the cam-follower rig.")),
     ] = True,
 ) -> None:
     """

@@ -22,15 +22,16 @@ class Branches:
 
 HEADINGS = ("orbit", "event", "at (rpm)", "largest multiplier (modulus)")
 _CAPTION = (
-    "Continuation for the thesis rig: follower angle, sampled once per cycle, against "
-    "cam speed. Stable orbits are solid, unstable ones dashed. P(1,1) has one impact "
-    "per cycle; P(inf,1) chatters, sticks and is released."
+    "Continuation for the cam-follower rig of the thesis (Alzate, 2008): follower "
+    "angle, sampled once per cycle, against cam speed. Stable orbits are solid, "
+    "unstable ones dashed. P(1,1) has one impact per cycle; P(inf,1) chatters, sticks "
+    "and is released."
 )
 
 
 def _interrupted(point) -> bool:
     """Find the interruption of chatter of the sticking orbit."""
-    return point.kind == "interruption of chatter"
+    return point.kind == "interruption of chattering"
 
 
 def follow_branches(folder: Path) -> Branches:

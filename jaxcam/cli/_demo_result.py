@@ -114,7 +114,7 @@ def _next_steps(found) -> list[tuple[str, str]]:
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --turns 40 "
             f"--out ./jaxcam-{rpm:.1f}rpm",
-            "Motion at the speed of the first run, with the parameters of Table 4.4.",
+            "Motion at the speed of the first run, with the parameters of the thesis.",
         ),
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",

@@ -54,10 +54,10 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
 
 
 _MISSING = (
-    "Unnamed functions, fitted together with the rig, with bands of twice the "
-    "standard error. A function of two arguments is shown against the first one, at "
-    "several values of the second. The rig parameters may have absorbed any part that "
-    "they can represent."
+    "Functions fitted to the unknown effects together with the rig parameters, with "
+    "bands of twice the standard error. A function of two arguments is shown against "
+    "the first one, at several values of the second. The rig parameters may have "
+    "absorbed any part that they can represent."
 )
 _UNSEEN = (
     "Residuals of a held-out recording, predicted one flight ahead: the textbook "

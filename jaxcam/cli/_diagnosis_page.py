@@ -66,7 +66,7 @@ def _effects(found: Diagnosis) -> list[str]:
         "where",
         "share of the misfit",
         "BIC",
-        "held-out (nats)",
+        "held-out gain (nats)",
         "bootstrap",
     )
     rows = [
@@ -124,8 +124,8 @@ def _alternatives(found: Diagnosis) -> list[str]:
     return [
         "<h2>Other explanations</h2>",
         table_html(("terms", "BIC", "reason for rejection"), rows, text=(0, 2)),
-        '<p class="note">The column BIC gives the BIC of each one minus that of '
-        "the verdict.</p>",
+        '<p class="note">The column BIC gives the BIC of each explanation minus that '
+        "of the verdict.</p>",
     ]
 
 
@@ -140,13 +140,13 @@ def _left_over(found: Diagnosis) -> list[str]:
         )
         for one in found.left_after
     ]
-    headings = ("form", "where", "gain", "threshold", "significant")
+    headings = ("free function", "where", "gain", "threshold", "significant")
     return [
         "<h2>Remaining structure in the residuals</h2>",
         table_html(headings, rows, text=(0, 1)),
-        '<p class="note">The gain is the increase in twice the log-likelihood if '
-        "the free function were added to the model. The threshold follows from the "
-        "false-alarm rate and the number of coefficients.</p>",
+        '<p class="note">The gain is the predicted increase in twice the '
+        "log-likelihood if the free function is added to the model. The threshold "
+        "follows from the false-alarm rate and the number of coefficients.</p>",
     ]
 
 

@@ -38,7 +38,7 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
         try:
             return command(*args, **kwargs)
         except KeyboardInterrupt:
-            fail("Stopped by Ctrl-C before the end; run it again to finish.")
+            fail("Stopped by Ctrl-C before the end; run the command again to finish.")
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
             # the reader of the pipe has closed it (jaxcam ... | head)

@@ -20,7 +20,8 @@ class Files:
         typer.Option(
             metavar="NAMES",
             help="Names of all columns in order, - to skip one "
-            "(time_s,-,angle_rad), or pairs (Angle=angle_deg,Y1=height_m*-8e-4).",
+            "(time_s,-,angle_rad), or a new name for some columns, with a factor "
+            "(Angle=angle_deg,Y1=height_m*-8e-4).",
         ),
     ] = None
     rate: Annotated[

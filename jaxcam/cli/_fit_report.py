@@ -41,7 +41,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
 def correlation_table(found: Fit) -> Table:
     """Tabulate the strongest correlations between parameters."""
     table = Table(title="Strongest correlations")
-    for heading in ("one", "other"):
+    for heading in ("parameter", "other parameter"):
         table.add_column(heading, no_wrap=True)
     table.add_column("correlation", justify="right")
     names = [one.name for one in found.estimates]

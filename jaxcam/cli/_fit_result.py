@@ -125,7 +125,7 @@ def fitted(
     again = None
     if bootstrap:
         again = fitting.bootstrap(
-            after, bootstrap, progress=lambda k, n: report("weighting flights", k / n)
+            after, bootstrap, progress=lambda k, n: report("bootstrap", k / n)
         )
     return Result(problem, segments, before, after, seen, laws, again)
 

@@ -33,8 +33,8 @@ def new_rig(
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name.name):
         raise ValueError(
-            f"NAME is {name.name[:100]!r}; give letters, digits, _ and - after a first "
-            f"letter, such as two_stops."
+            f"NAME is {name.name[:100]!r}; give a letter, followed by letters, digits, "
+            "_ or -, such as two_stops."
         )
     if not name.parent.is_dir():
         raise ValueError(f"{name.parent}: there is no such folder; create it first.")

@@ -32,7 +32,7 @@ class Outlook:
         if self.speeds:
             yield Rows(
                 "Cam speeds at which the motion changes",
-                ("change", "textbook (rpm)", "with the missing effects (rpm)"),
+                ("transition", "textbook (rpm)", "with the missing effects (rpm)"),
                 [(one.name, _rpm(one.before), _rpm(one.after)) for one in self.speeds],
                 "Predictions for this rig; the standard errors follow from those of "
                 "the fit.",
@@ -40,11 +40,11 @@ class Outlook:
         if self.experiments:
             yield Rows(
                 "Recommended next recording",
-                ("recording at", "errors become", "parameters"),
+                ("recording at", "ratio of errors", "parameters"),
                 [(one.name, f"{one.factor:.0%}", _asked(one)) for one in self.shown],
-                "Standard errors with this recording in addition to the others, "
-                "relative to those without it, from the sensitivities of the diagnosed "
-                "model.",
+                "The ratio compares the standard errors with and without this "
+                "additional recording, computed from the sensitivities of the "
+                "diagnosed model.",
             )
 
     @property
@@ -52,9 +52,7 @@ class Outlook:
         return self.experiments[:_SHOWN]
 
     def data(self) -> dict[str, Any]:
-        """Return the data for verdict.json (speeds in rad/s); empty parts are
-        omitted.
-        """
+        """Return the data for verdict.json without empty parts; speeds in rad/s."""
         found: dict[str, Any] = {}
         if self.speeds:
             found["predictions"] = [dataclasses.asdict(one) for one in self.speeds]
@@ -80,7 +78,7 @@ def terminal_table(rows: Rows) -> Table:
 
 def _asked(one: Experiment) -> str:
     names = list(one.now)
-    return ", ".join(names) if len(names) < 4 else f"{len(names)} terms on average"
+    return ", ".join(names) if len(names) < 4 else f"mean of {len(names)} parameters"
 
 
 def _rpm(speed: Value) -> str:

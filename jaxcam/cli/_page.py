@@ -76,7 +76,7 @@ def _branches(found: Branches | None) -> list[str]:
     if found is None:
         return []
     return [
-        "<h2>Orbits of the rig of the thesis</h2>",
+        "<h2>Periodic orbits of the thesis rig</h2>",
         figure_html(found.figure, found.caption),
         table_html(HEADINGS_OF_BRANCHES, found.rows, text=(0, 1)),
     ]
@@ -123,7 +123,7 @@ def page(report: Report) -> str:
     )
 
 
-_MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most clearly in")
+_MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most significant at")
 
 
 def _cells(row: Row) -> tuple[str, ...]:

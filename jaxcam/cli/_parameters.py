@@ -43,7 +43,7 @@ def parameters(system: HybridSystem) -> dict[str, float]:
 def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
     """Return the system with `name=value` for some of its parameters.
 
-    `restitution.r=0.6` gives a cam-follower a constant restitution.
+    `restitution.r=0.6` gives a cam-follower a constant coefficient of restitution.
 
     Raises:
         ValueError: A name is not a parameter, or a value is not a number.
@@ -56,7 +56,7 @@ def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> Hybri
             continue
         leaves = _leaves(system)
         if name == _SPEED and name in leaves and _in_rpm(system):
-            raise ValueError(f"--set {assignment}: give the speed in rpm, as --speed.")
+            raise ValueError(f"--set {assignment}: use --speed, with the speed in rpm.")
         if name not in leaves:
             raise ValueError(
                 f"--set {assignment}: there is no parameter {name!r}; the parameters "
@@ -96,8 +96,8 @@ def _split(assignment: str) -> tuple[str, float]:
         value = math.nan
     if not math.isfinite(value):
         raise ValueError(
-            f"--set {assignment}: {text.strip() or 'nothing'} is not a finite number; "
-            f"give one, such as {name.strip()}=0.6."
+            f"--set {assignment}: {text.strip() or 'an empty value'} is not a finite "
+            f"number; give one, such as {name.strip()}=0.6."
         )
     return name.strip(), value
 
@@ -114,7 +114,7 @@ def _leaves(system) -> dict[str, jax.Array]:
 def _names(system, leaves) -> list[str]:
     names = [name for name in leaves if name != _SPEED or not _in_rpm(system)]
     if isinstance(system, CamFollower) and _CONSTANT not in names:
-        names.append(f"{_CONSTANT} (a constant restitution)")
+        names.append(f"{_CONSTANT} (a constant coefficient)")
     return names
 
 

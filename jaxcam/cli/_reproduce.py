@@ -25,7 +25,7 @@ def reproduce(
         ),
     ] = None,
     preset: Annotated[
-        str, typer.Option(metavar="NAME", help=f"The rig: {' or '.join(_PRESETS)}.")
+        str, typer.Option(metavar="NAME", help=f"Rig: {' or '.join(_PRESETS)}.")
     ] = _PRESETS[0],
     size: Annotated[
         str,
@@ -42,13 +42,15 @@ def reproduce(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write numbers and figures to DIR, and with all targets also a page.",
+            help="Write numbers and figures to DIR; for all targets, also a web page.",
         ),
     ] = None,
     resume: Resume = False,
 ) -> None:
     """
-    Reproduce tables and figures of the thesis; compare printed and computed values.
+    Reproduce tables and figures of a PhD thesis (Alzate, 2008).
+
+    The tables show printed and computed values.
 
     \b
     Examples:

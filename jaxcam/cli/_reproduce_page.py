@@ -59,7 +59,7 @@ def write_page(
 
 
 def _page(folder, records, settings, of) -> str:
-    title = "Tables and figures of the thesis, printed and computed"
+    title = "Tables and figures of the thesis (Alzate, 2008), printed and computed"
     failed = [record.name for record in records if record.error is not None]
     minutes = sum(record.seconds for record in records) / 60
     sentence = (

@@ -22,8 +22,9 @@ _SETTLE = 20.0
 class Intervals(NamedTuple):
     """Contact intervals, each from its start to the release.
 
-    - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped. -
-      `turns`: number of cam turns examined.
+        - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped.
+    - `turns`: number of cam turns examined.
+
     - `share`: fraction of the time in contact, including intervals truncated by the
       ends of the recording.
     """
@@ -91,7 +92,7 @@ def rest_table(found: list[Rests]) -> Table:
     return table
 
 
-HEADINGS = ("run", "", "per turn", "from (rad)", "to (rad)", "share of time")
+HEADINGS = ("run", "", "per cycle", "from (rad)", "to (rad)", "fraction of time")
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:

@@ -46,7 +46,7 @@ class RunOptions:
         typer.Option(
             metavar="NAME",
             help=(
-                "loop, or diffeqsolve (one call per flight; also supports implicit "
+                "loop, or diffeqsolve (one diffrax call per flight; also for implicit "
                 "solvers)."
             ),
         ),

@@ -62,7 +62,7 @@ def contact_table(trajectory: Trajectory) -> Table | None:
     unit = _unit(system)
     table = Table(title="Contacts")
     table.add_column("", justify="right", no_wrap=True)
-    for heading in ("from", "to", "length"):
+    for heading in ("from", "to", "duration"):
         table.add_column(_heading(heading, unit), justify="right", no_wrap=True)
     table.add_column("ended by")
     for k in _shown(len(start)):

@@ -44,8 +44,8 @@ def diagnose(
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
             `jaxcam.fitting.read_setup`, which include sensors and tolerances; or any
-            system with one coordinate, together with `sensors`, `parameters` and
-            `drive`.
+            system with at least one coordinate, together with `sensors`, `parameters`
+            and `drive`.
         recordings: At least two recordings of a rig; for a bare system, segments from
             `jaxcam.recordings.segment`.
         candidates: Terms that may be named; default `library()`, with the constants of
@@ -79,7 +79,7 @@ def diagnose(
     found = asked(recordings, keep)
     odd = odd_record(found)
     if odd is not None:
-        report(f"setting {odd} aside", None)
+        report(f"repeating the diagnosis without {odd}", None)
         others = [run for run in recordings if _name_of(run) != odd]
         folder = None if keep is None else keep / "without_one"
         found = set_aside(found, asked(others, folder), odd)

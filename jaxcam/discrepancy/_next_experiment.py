@@ -162,7 +162,7 @@ def next_experiments(
         One `Experiment` for each speed, the most informative first.
 
     Raises:
-        ValueError: The drive of the rig does not turn.
+        ValueError: The rig has no rotating drive.
         RecordingError: No flight occurs at any of the speeds.
     """
     parts = found.after.problem.segments

@@ -182,7 +182,7 @@ class Policy:
         "computed more accurately",
     )
     astray: float = _bounds(
-        3.0, "prior standard errors beyond which a fit is restarted from nominal"
+        3.0, "prior standard deviations beyond which a fit restarts from nominal values"
     )
     hopeless: float = _bounds(
         2.0, "multiple of the smallest cost above which a fit is not refined further"

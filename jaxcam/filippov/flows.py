@@ -61,7 +61,7 @@ def filippov_flow(
         t0: Start time (s).
         t1: End time (s).
         tolerance: Relative error allowed per step.
-        max_steps: Budget of attempted integration steps.
+        max_steps: Maximum number of attempted integration steps.
 
     Returns:
         The state, shape `(n,)`; NaN if `t1` is not reached within `max_steps` attempted

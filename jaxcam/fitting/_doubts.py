@@ -80,28 +80,30 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
     joints, kind = np.asarray(costs.joints), np.asarray(pieces.joint)
     flown, rested = np.asarray(costs.flown), np.nan_to_num(np.asarray(costs.rested))
     size = problem.start.states.shape[-1]
-    one = "cost per sample is"
+    sampled = "pieces, the cost per sample"
+    joined = "joints, the cost per component"
+    within, impact = used & (kind == FLIGHT), used & (kind == IMPACT)
     parts = (
-        ("flight", one, flown / np.maximum(counts, 1), used & (counts > 0), _PIECE),
-        ("contact", one, rested / np.maximum(rests, 1), resting, _PIECE),
         (
-            "joints within flights",
-            "cost is",
-            joints / size,
-            used & (kind == FLIGHT),
-            _JOINT,
+            "in flight",
+            sampled,
+            flown / np.maximum(counts, 1),
+            used & (counts > 0),
+            _PIECE,
         ),
-        ("impacts", "cost is", joints / (size + 1), used & (kind == IMPACT), _JOINT),
+        ("in contact", sampled, rested / np.maximum(rests, 1), resting, _PIECE),
+        ("between pieces of flight", joined, joints / size, within, _JOINT),
+        ("at impacts", joined, joints / (size + 1), impact, _JOINT),
     )
-    for name, what, cost, rows, most in parts:
+    for place, measure, cost, rows, most in parts:
         if not np.any(rows):
             continue
         level = float(np.quantile(cost[rows], _USUAL))
         if not level <= most:
             return (
-                f"The fit is far from the data in {name}: the {what} at least "
-                f"{level:.3g} in a quarter of the cases, compared with 1 for noise; "
-                "the model, the initial values or the stated noise must be wrong."
+                f"The fit is far from the data {place}: in the worst quarter of the "
+                f"{measure} is at least {level:.3g} (noise alone gives 1); the model, "
+                "the initial values or the stated noise must be wrong."
             )
     total = np.where(used, flown + joints, 0.0)
     rest = np.sum(np.where(resting, rested, 0.0))
@@ -111,9 +113,9 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         r, k = np.unravel_index(np.argmax(total), total.shape)
         when = float(np.asarray(pieces.flown.start)[r, k])
         return (
-            f"The fit is far from the data: the cost per sample is {mean:.3g}, "
-            f"compared with 1 for noise; it is largest in {problem.records[r]} near "
-            f"{when:.4g} s, so check the residuals there."
+            f"The fit is far from the data: the cost per sample is {mean:.3g} (noise "
+            f"alone gives 1); it is largest in {problem.records[r]} near {when:.4g} s, "
+            "so check the residuals there."
         )
     return ""
 

@@ -35,12 +35,17 @@ PROMISE = 1e-3
 _GRADIENT = 1e-2
 # Steps that may follow before the first one is accepted or rejected
 _CORRECTIONS = 3
+# Share of the excess cost to which each of them must reduce it
+_LEADS_BACK = 0.5
 # A flight with more pieces than this is initially not predicted from its start
 _LONG = 16
 # Factors on parameters without a tolerance, for restarts after a fit ended far off
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
 # in units of the parameters' scales, over which a model may be nonlinear
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
+# Factors on the damping after a good step and a poor one; and after a good step, if
+# less damping has recently failed
+_EASED, _POOR = 0.1, 0.5
 
 
 def fit(
@@ -180,11 +185,13 @@ def _descend(
     cost = total(costs, point)
     damping, message, optimal, count = _FIRST_DAMPING, "", False, 0
     so_far = [cost]
+    # what the next good step does to the damping; steps rejected since the last one
+    eased, raised = _EASED, 0
     while count < iterations:
         count += 1
         step, promise = damped_step(problem, columns, blocks, point, damping, prior)
         fine = np.isfinite(promise)
-        if fine and promise < PROMISE and damping <= 1e-1:
+        if fine and promise < PROMISE:
             # a damped step predicts little gain along a valley; the undamped step must
             # as well
             _, whole = damped_step(
@@ -193,27 +200,34 @@ def _descend(
             if not whole > _GRADIENT or damping <= _LEAST_DAMPING:
                 optimal, message = True, "The optimum was reached."
                 break
-            damping = max(0.1 * damping, _LEAST_DAMPING)
+            if damping <= 1e-1:
+                damping = max(0.1 * damping, _LEAST_DAMPING)
         found, changed, value = blocks, costs, np.inf
         if fine:
             found, changed = linearise(step)
             value = total(changed, step)
+        excess = np.inf
         for _ in range(_CORRECTIONS):
             # the valley is curved and steep: a long step along it ends on its side, so
-            # it is assessed after the next steps
-            if value <= cost or not np.isfinite(value):
+            # it is assessed after the next steps, while these lead back quickly
+            if value <= cost or not value - cost < _LEADS_BACK * excess:
                 break
+            excess = value - cost
             step, _ = damped_step(problem, columns, found, step, damping, prior)
             found, changed = linearise(step)
             value = total(changed, step)
         if value <= cost and np.isfinite(value):
             gained = (cost - value) / max(promise, 1e-300)
             point, blocks, costs, cost = step, found, changed, value
-            damping = max(damping * (0.1 if gained > 0.5 else 0.5), _LEAST_DAMPING)
+            good = gained > 0.5
+            damping = max(damping * (eased if good else _POOR), _LEAST_DAMPING)
+            eased, raised = (_EASED if good and not raised else _POOR), 0
             if progress is not None:
                 progress(count, cost)
         else:
-            damping *= 10
+            raised += 1
+            damping *= 10**raised
+            eased = _POOR
             if damping > _MOST_DAMPING:
                 message = (
                     "No further step improves the fit, although it is not at an "

@@ -17,7 +17,7 @@ from ._restitution import fit_rows, RestitutionFit
 _LEAST = 4
 # A row that deviates by more than this many standard deviations is an outlier
 _MISREAD = 6.0
-# Probability that a constant restitution appears to depend on the speed
+# Probability that a constant coefficient appears to depend on the speed
 _CHANCE = 0.01
 # If more than this fraction are outliers, none is excluded
 _MAJORITY = 0.7
@@ -54,7 +54,7 @@ class ImpactLaw:
     that the impacts do not support is the constant law with one extra parameter.
     """
     p_value: float
-    """Probability of such a gain of the power law if restitution is constant."""
+    """Probability of such a gain of the power law if the coefficient is constant."""
     scatter: float
     """Standard deviation of single impacts, in `scatter_unit`."""
     scatter_unit: str
@@ -167,7 +167,8 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     impacts is estimated: it is constant either in the speed or in the coefficient of
     restitution, whichever is more likely; if the table contains errors, it is
     proportional to them. The power law is chosen if, according to an F test, it would
-    gain as much by chance in at most one of a hundred tables with constant restitution.
+    gain as much by chance in at most one of a hundred tables with a constant
+    coefficient.
 
     Args:
         table: The impacts.

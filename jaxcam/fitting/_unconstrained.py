@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 # Fractions of the largest singular value, with columns of unit length, below which a
 # combination is certainly, or possibly, due to rounding
-_BLIND, _DOUBTFUL = 1e-6, 3e-3
+_BLIND, _DOUBTFUL = 4e-6, 3e-3
 # Growth of information that comes from the states alone, if they are held a hundred
 # times as firmly
 _GROWS = 10.0
@@ -56,7 +56,8 @@ def unconstrained(
     the squares of the singular values, with every column of J at unit length.
 
     **Arguments:** names and `information` of the parameters in units of their `scale`;
-    `firmer` returns the same matrix with the eliminated states held more firmly.
+    `firmer` returns the same matrix with a stronger regularisation of the eliminated
+    states.
     """
     diagonal = np.diag(information)
     dead = ~(diagonal > 0)

@@ -80,12 +80,12 @@ class Corner:
 def corners(system: HybridSystem, state: VectorLike) -> list[Corner]:
     """Return the places where the functions of a system are not smooth.
 
-    The functions are traced, not evaluated: `abs`, `sign`, `where`, `maximum`,
-    `minimum`, `clip`, `floor`, `remainder` and the like are found if what they are
-    applied to, or the condition of a `where`, depends on time or state, wherever the
-    corner is. A motion steps across such a place with shortened steps and a larger
-    error; a [`jaxcam.hybrid.SwitchedSystem`][] locates it. A `where` that only avoids
-    a division by zero is reported as well.
+    The functions are traced, not evaluated. The operations `abs`, `sign`, `where`,
+    `maximum`, `minimum`, `clip`, `floor`, `remainder` and similar ones are reported if
+    their arguments, or the condition of a `where`, depend on time or state. A
+    simulation crosses such a corner with shortened steps and a larger error, whereas a
+    [`jaxcam.hybrid.SwitchedSystem`][] locates it as an event. A `where` that only
+    avoids a division by zero is reported as well.
 
     Args:
         system: The system.

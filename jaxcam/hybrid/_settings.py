@@ -32,8 +32,8 @@ class Settings(eqx.Module):
     """
     chatter_smallness: FloatScalar = 1e-3
     """Chatter is completed analytically only if lambda/(1 - r) is below this value,
-    with lambda = v |j| / a^2. The relative error of the completed time is about its
-    square.
+    with lambda = u |j| / a^2 for rebound speed u, jerk j and acceleration a. The
+    relative error of the completed time is about the square of this value.
     """
     chatter_depth: FloatScalar = 1e-6
     """Chatter is completed analytically only after the speed has fallen to this

@@ -62,10 +62,10 @@ def simulate(
 
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][].
-        state: Initial state, shape `(n,)`, with every gap >= 0. `None` starts on the
-            orbit that was last released from contact (for systems with a period, two
-            states and one constraint): in contact at `t0` if contact is maintained
-            then, otherwise at the last release before `t0`.
+        state: Initial state, shape `(n,)`, with every gap >= 0. `None` (for
+            systems with a period, two states and one constraint) starts in contact at
+            `t0` if contact is maintained then, otherwise at the last release before
+            `t0`.
         t0: Start time (s).
         t1: End time (s), t1 >= t0.
         tolerance: Error allowed per step, relative to the distance that each component
@@ -111,7 +111,8 @@ def simulate(
     if engine == "diffeqsolve":
         if isinstance(system, SwitchedSystem):
             raise ValueError(
-                'engine="diffeqsolve" knows no switching surfaces; use engine="loop"'
+                'engine="diffeqsolve" does not support switching surfaces; use '
+                'engine="loop"'
             )
         if traced:
             raise ValueError(

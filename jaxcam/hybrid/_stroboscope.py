@@ -30,16 +30,19 @@ class Stroboscope(Printed):
     """
 
     states: np.ndarray
-    """States at t0 + k period, k = skip + 1..turns, shape `(lanes, turns - skip, n)`.
+    """States at t0 + k period, k = skip + 1..turns, shape `(trajectories, turns - skip,
+    n)`.
     """
     impacts: np.ndarray
-    """Number of impacts of each trajectory, shape `(lanes,)`."""
+    """Number of impacts of each trajectory, shape `(trajectories,)`."""
     steps: np.ndarray
-    """Number of attempted integration steps, shape `(lanes,)`."""
+    """Number of attempted integration steps, shape `(trajectories,)`."""
     code: np.ndarray
-    """Index into `RESULTS`, shape `(lanes,)`; 0 if the trajectory reached its end."""
+    """Index into `RESULTS`, shape `(trajectories,)`; 0 if the trajectory reached its
+    end.
+    """
     hits: np.ndarray
-    """Impacts in each sampled period, shape `(lanes, turns - skip)`."""
+    """Impacts in each sampled period, shape `(trajectories, turns - skip)`."""
     rests: np.ndarray
     """Completed chatter sequences in each sampled period, same shape."""
 
@@ -95,15 +98,15 @@ def stroboscope(
 
     Args:
         system: The system; all trajectories share it unless `where` is given.
-        states: Initial states, shape `(lanes, n)` with one row per trajectory, or
-            `(n,)` if all start from the same state.
+        states: Initial states, shape `(trajectories, n)` with one row per trajectory,
+            or `(n,)` if all start from the same state.
         turns: Number of periods.
         skip: Number of periods at the start that are not sampled.
         t0: Start time (s).
         where: Selects the parameter that differs between trajectories
             (`lambda s: s.speed`, or its dotted name), or several.
-        values: Value of that parameter in each trajectory, shape `(lanes,)` or
-            `(lanes, k)`.
+        values: Value of that parameter in each trajectory, shape `(trajectories,)` or
+            `(trajectories, k)`.
         period: Sampling period (s); default the system's forcing period.
         settings: Accuracy settings; the default completes chatter as soon as the theory
             allows.
@@ -177,7 +180,7 @@ def stroboscope(
 
 
 def _one_for_each(states, values) -> np.ndarray:
-    """Return one initial state for each trajectory, shape `(lanes, n)`."""
+    """Return one initial state for each trajectory, shape `(trajectories, n)`."""
     if states.ndim != 1:
         return states
     return np.broadcast_to(states, (1 if values is None else len(values), len(states)))

@@ -11,21 +11,21 @@ from ._types import RealScalar, State
 
 
 class SwitchedSystem(HybridSystem):
-    """A system whose vector field switches where it crosses a surface.
+    """A system whose vector field changes when the state crosses a surface.
 
     Subclass it and define two methods. `switching` returns one function per switching
-    surface, which is zero on it; `branch` returns the rates of the state for given
-    sides of the surfaces, +1 where the function is positive and -1 where it is
-    negative. Each branch is smooth, also beyond the surfaces. The event loop locates
-    a crossing as exactly as an impact, ends the step there and goes on with the other
-    branch, so that a stiffness with a corner, backlash or a relay costs no accuracy and
-    crossings have exact derivatives.
+    surface, which is zero on the surface; `branch` returns the rates of the state for
+    given sides of the surfaces, +1 where the function is positive and -1 where it is
+    negative. Each branch must remain smooth slightly beyond its surfaces. The event
+    loop locates a crossing as accurately as an impact, ends the step there and
+    continues with the other branch. A stiffness with a corner, backlash or a relay
+    therefore causes no loss of accuracy, and crossings have exact derivatives.
 
-    There are no constraints by default; define `gap` and `impact` if the system has
-    impacts, too. `hysteresis` makes a relay of a surface, and `reset` a jump of the
-    state. A motion that both branches drive into the surface would slide along it:
-    the run ends there with the result `RESULTS.slides`, and
-    [`jaxcam.filippov.FilippovSystem`][] is for such systems.
+    There are no constraints by default; define `gap` and `impact` if the system also
+    has impacts. `hysteresis` separates the two thresholds of a surface, as in a relay,
+    and `reset` defines a jump of the state. If both branches point towards a surface,
+    the motion would slide along it: the run ends there with the result
+    `RESULTS.slides`. Use a [`jaxcam.filippov.FilippovSystem`][] for such systems.
 
     Examples:
         >>> from jaxcam.hybrid import SwitchedSystem
@@ -108,9 +108,9 @@ class SwitchedSystem(HybridSystem):
     def hysteresis(self) -> Any:
         """Return how far beyond zero a switching function passes before it switches.
 
-        A number, or shape `(k,)`; zero by default. A motion on the positive side
-        switches where the function falls to -hysteresis, one on the negative side where
-        it rises to +hysteresis, as a relay does.
+        It is a number, or has shape `(k,)`; the default is zero. A motion on the
+        positive side switches where the function falls to -hysteresis, and a motion on
+        the negative side where it rises to +hysteresis, as in a relay.
         """
         return 0.0
 

@@ -66,9 +66,9 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     backward = "t1 is before t0, but time runs forward: interchange them."
     """t1 is before t0."""
     together = (
-        "Impacts on two or more constraints accumulate together, and only those on one "
-        "are summed: choose t1 before this time, or parameters with which one "
-        "constraint comes to rest before impacts on the next begin."
+        "Impacts on two or more constraints accumulate together, and the chatter sum "
+        "is valid for one constraint only: choose t1 before this time, or parameters "
+        "with which the impacts on one constraint end before those on the next begin."
     )
     """Impacts on several constraints accumulate together."""
     accumulates = (

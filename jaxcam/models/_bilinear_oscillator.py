@@ -18,11 +18,11 @@ class BilinearOscillator(SwitchedSystem):
     """Oscillator with a one-sided elastic stop, dimensionless.
 
     `x'' + 2 damping x' + k(x) = amplitude cos(omega t)`; the state is (x, x'). The
-    spring force is k = x up to the stop, and beyond it the stop is pressed as well:
-    k = x + (stiffness - 1) (x - stop). Free and undamped, with the stop at zero, half a
-    period lasts pi on one side and pi / sqrt(stiffness) on the other. An infinite
-    stiffness is the rigid wall of [`jaxcam.models.ImpactOscillator`][] with
-    restitution one.
+    restoring force is k = x up to the stop, and k = x + (stiffness - 1) (x - stop)
+    beyond it. If the motion is free and undamped and the stop
+    is at zero, the half periods on the two sides are pi and pi / sqrt(stiffness). For
+    infinite stiffness, the stop is the rigid wall of
+    [`jaxcam.models.ImpactOscillator`][] with a coefficient of restitution of one.
 
     S. W. Shaw, P. J. Holmes, A periodically forced piecewise linear oscillator, Journal
     of Sound and Vibration 90 (1983), 129-155.
@@ -36,9 +36,9 @@ class BilinearOscillator(SwitchedSystem):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("position", "velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     stiffness: jax.Array = parameter(4.0)
     """Stiffness beyond the stop; before it the stiffness is one."""
@@ -52,7 +52,7 @@ class BilinearOscillator(SwitchedSystem):
     """Angular frequency of the forcing."""
 
     def switching(self, t, state) -> jax.Array:
-        """Return how far the stop is pressed, negative before it."""
+        """Return the deflection of the stop, negative if there is no contact."""
         del t
         return state[0] - self.stop
 
@@ -71,7 +71,7 @@ class BilinearOscillator(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(stiffness=self.stiffness, omega=self.omega)
         require_finite(stop=self.stop, amplitude=self.amplitude)
         require_not_negative(damping=self.damping)

@@ -63,7 +63,7 @@ class BouncingBall(HybridSystem):
         return 2 * jnp.pi / self.frequency
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(gravity=self.gravity, frequency=self.frequency)
         require_restitution(self.restitution)
         require_finite(amplitude=self.amplitude)

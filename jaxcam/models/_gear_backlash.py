@@ -41,9 +41,9 @@ class GearBacklash(SwitchedSystem):
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("transmission error", "velocity")
-    """Names of the state's components."""
+    """Names of the state components."""
     state_units: ClassVar[tuple[str, ...]] = ("-", "-")
-    """Units of the state's components."""
+    """Units of the state components."""
 
     clearance: jax.Array = parameter(1.0)
     """Half the backlash."""
@@ -76,7 +76,7 @@ class GearBacklash(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(clearance=self.clearance, omega=self.omega)
         require_finite(load=self.load, amplitude=self.amplitude)
         require_not_negative(damping=self.damping)

@@ -69,8 +69,8 @@ class PlanarStability(NamedTuple):
 
 
 def planar_stability(system: PiecewiseLinear) -> PlanarStability:
-    """Return the stability of the origin of a planar continuous system (thesis, Theorem
-    2.2).
+    """Return the stability of the origin of a planar system with a continuous field
+    (thesis, Theorem 2.2).
 
     Args:
         system: The system.

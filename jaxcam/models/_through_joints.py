@@ -49,7 +49,7 @@ def simulate_through_joints(
 
     The run stops at every joint and continues with the next piece, so that each part is
     smooth. At a joint where the slope of the lift jumps up, a follower in contact has
-    an impact; where it jumps down, the follower is thrown off. The times of the joints
+    an impact; where it jumps down, the follower leaves the cam. The times of the joints
     do not depend on the state, so a deviation passes them unchanged, and only impacts
     have saltation matrices.
 

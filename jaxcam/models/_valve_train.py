@@ -19,11 +19,10 @@ from .cams import CamProfile
 
 
 class ValveTrain(AbstractCamDriven):
-    """A translating follower on a cam of constant speed: m x'' + c x' + k x + F0 =
-    contact.
+    """A translating follower on a cam of constant speed: m x'' + c x' + k x + F0 = Fc.
 
-    The state is the lift and velocity of the follower (m, m/s); the gap is the distance
-    between the follower and the cam.
+    Fc is the contact force. The state is the lift and velocity of the follower (m,
+    m/s); the gap is the distance between the follower and the cam.
 
     Examples:
         >>> from jaxcam.models import MotionProgram, Segment, ValveTrain

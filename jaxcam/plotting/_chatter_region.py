@@ -67,7 +67,11 @@ def chattering_picture(
         label="D: complete chatter",
     )
     ax.plot(
-        time[inside] / period, speed[inside], color=SECTION, lw=1.4, label="C: its edge"
+        time[inside] / period,
+        speed[inside],
+        color=SECTION,
+        lw=1.4,
+        label="C: boundary of D",
     )
     top = 1.3 * float(np.max(speed[inside])) if most is None else most
     ax.set(xlim=(-0.75, 0.25), ylim=(0, top))

@@ -66,10 +66,10 @@ def cobweb(
     steps = np.repeat(points, 2)
     ax.plot(
         steps[:-2], np.append(low, steps[2:-1]), color=IMPACT, linewidth=0.8,
-        label="motion",
+        label="orbit",
     )  # fmt: skip
     if edge is not None:
-        ax.axvline(edge, color=BAND, linestyle="--", linewidth=1.0, label="graze")
+        ax.axvline(edge, color=BAND, linestyle="--", linewidth=1.0, label="grazing")
     ax.set_xlim(low, high)
     ax.set_ylim(low, high)
     ax.set_aspect("equal")

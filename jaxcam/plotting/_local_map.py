@@ -76,7 +76,7 @@ def local_map(
     web = np.array(points).T
     ax.plot(*web, color=SECTION, lw=0.7, label="cobweb")
     ax.set_xlabel("state at the section")
-    ax.set_ylabel("one turn later")
+    ax.set_ylabel("state one period later")
     ax.set_ylim(np.nanmin(shown) - 0.1 * span, np.nanmax(shown) + 0.3 * span)
     legend_above(ax)
     return figure_of(ax)

@@ -20,8 +20,8 @@ def multipliers(
         values: Multipliers, complex, shape `(n,)`, or `(orbits, n)` for the orbits of a
             branch.
         ax: Axes to draw on; default a new figure.
-        reach: Half the width of the figure; by default, all multipliers are inside.
-            Multipliers beyond it are marked at the edge.
+        reach: Limit of both axes, which extend from `-reach` to `reach`; by default,
+            all multipliers are inside. Multipliers outside are marked at the edge.
 
     Returns:
         The figure.

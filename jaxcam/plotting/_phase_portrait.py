@@ -61,7 +61,7 @@ def phase_portrait(
             markersize=5,
             markeredgecolor="white",
             markeredgewidth=0.6,
-            label="once per period",
+            label="stroboscopic points",
             zorder=4,
         )
     ax.set_xlabel(state_label(trajectory.system, components[0]))

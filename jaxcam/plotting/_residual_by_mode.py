@@ -86,7 +86,7 @@ def residual_by_mode(
     left.set_xlabel(
         "time (s)" if against == "time" else "cam angle within one turn (rad)"
     )
-    right.set_xlabel("share (%)")
+    right.set_xlabel("fraction (%)")
     grid[0, 1].set_title("line: noise alone", fontsize="small")
     # for all rows; compared with a large residual, the noise fills one bin, which may
     # be truncated

@@ -12,7 +12,7 @@ from ._errors import RecordingError
 from ._recording import Recording
 
 
-# The speed of a drive wanders over seconds and ripples once per turn; a window of 50 ms
+# The speed of a drive drifts over seconds and ripples once per turn; a window of 50 ms
 # follows both and leaves a tenth of the encoder noise
 _WINDOW = 0.05
 
@@ -39,8 +39,8 @@ class Drive:
         """Return the time (s) at which a drive of constant `speed` has the measured
         angle.
 
-        A simulation at constant speed is compared on this clock, so that slow wandering
-        of the drive is not attributed to a missing effect.
+        A simulation at constant speed is compared on this clock, so that slow drift of
+        the drive is not attributed to a missing effect.
         """
         return (self.angle - self.phase) / self.speed
 

@@ -19,9 +19,9 @@ class Exponents(NamedTuple):
     """Largest Lyapunov exponents (1/s) and their standard errors."""
 
     largest: np.ndarray
-    """Largest exponent of each motion (1/s), shape `(lanes,)`."""
+    """Largest exponent of each motion (1/s), shape `(motions,)`."""
     stderr: np.ndarray
-    """Standard error of each exponent (1/s), shape `(lanes,)`."""
+    """Standard error of each exponent (1/s), shape `(motions,)`."""
 
     @property
     def chaotic(self) -> np.ndarray:
@@ -42,8 +42,8 @@ def largest_exponents(
 
     Args:
         section: The section, as for [`jaxcam.sweeps.diagram`][].
-        states: States after the decay of transients, shape `(lanes, n)`; NaN rows give
-            NaN.
+        states: States after the decay of transients, shape `(motions, n)`; NaN rows
+            give NaN.
         turns: Number of periods to average over, at least 16.
         where: As for a section; motions with the same second parameter are computed
             together.
@@ -106,7 +106,7 @@ def _within(progress, begun: float, size: float, share: float) -> None:
 
 
 def _together(system, where, values, lanes):
-    """Return lanes for one call, their system, and its varying parameters."""
+    """Return motions for one call, their system, and its varying parameters."""
     everybody = np.arange(lanes)
     if where is None:
         yield everybody, system, None, None

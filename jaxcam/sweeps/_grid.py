@@ -70,7 +70,7 @@ class Grid(eqx.Module):
             last: Row of the first component before which to stop; default all.
 
         Returns:
-            Shape `(lanes, n)`.
+            Shape `(motions, n)`.
         """
         axes = [self.centres(i) for i in range(len(self.shape))]
         axes[0] = axes[0][first:last]
@@ -81,10 +81,10 @@ class Grid(eqx.Module):
         """Return the index of the cell of each state; -1 outside the grid.
 
         Args:
-            states: States, shape `(lanes, n)`.
+            states: States, shape `(motions, n)`.
 
         Returns:
-            Indices as in `states`, shape `(lanes,)`.
+            Indices as in `states`, shape `(motions,)`.
         """
         states = np.asarray(states, dtype=float)
         sizes = np.where(self.sizes > 0, self.sizes, 1.0)

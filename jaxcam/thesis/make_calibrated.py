@@ -140,7 +140,7 @@ def published(system: CamFollower) -> list[Published]:
     """
     guess = first_orbit(system)
     if guess is None:
-        raise ValueError("The rig has no orbit with one impact per turn at 148 rpm.")
+        raise ValueError("The rig has no orbit with one impact per cycle at 148 rpm.")
     far = ~table_5_2.NEAR_FOLD
     speeds = jnp.asarray(rpm_to_rad_s(table_5_2.SPEEDS[far]))
     point = release_point(

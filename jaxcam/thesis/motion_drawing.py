@@ -41,7 +41,7 @@ def draw_gap(ax, run: Trajectory) -> None:
     if np.nanmax(np.abs(drawn.gap)) < 1e-9:
         # permanent contact: rounding is not shown
         ax.set_ylim(-1e-3, 1e-3)
-    ax.set_ylabel("above cam (rad)")
+    ax.set_ylabel("gap (rad)")
 
 
 def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
@@ -53,9 +53,7 @@ def draw_portrait(ax, run: Trajectory, motion: SettledMotion) -> None:
     turns = motion.turns or round(float(run.t1 - run.t0) / float(run.system.period))
     times = float(run.t0) + float(run.system.period) * np.arange(turns)
     points = np.asarray(run.at(times))
-    ax.plot(
-        *points.T, "o", color="k", ms=5, mec="white", mew=0.6, label="once per turn"
-    )
+    ax.plot(*points.T, "o", color="k", ms=5, mec="white", mew=0.6, label="stroboscopic")
     ax.set_ylabel("velocity (rad/s)")
 
 

@@ -57,7 +57,7 @@ def reproduce(
     progress: Callable[[str, float | None], None] | None = None,
 ) -> "pd.DataFrame":
     """Reproduce a table of the thesis, or the numbers of a figure, and compare with the
-    print.
+    printed values.
 
     Args:
         name: A key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".

@@ -52,7 +52,7 @@ def draw_turn(run: Trajectory, ax, label: str, colour: str, dashes="solid") -> N
     gap = np.asarray(run.gap(times))
     ax.plot(times - times[0], gap, color=colour, ls=dashes, lw=1.2, label=label)
     ax.set_xlabel("time from release (s)")
-    ax.set_ylabel("angle above cam (rad)")
+    ax.set_ylabel("gap (rad)")
 
 
 def released_target(title: str, *cases: tuple[float, float], note: str = "") -> Target:

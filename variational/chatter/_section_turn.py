@@ -34,7 +34,7 @@ class SectionArrival(eqx.Module):
     velocity: Float[Array, "..."]
     """Normal velocity at the section, more accurate than if computed from the state."""
     impacts: Int[Array, "..."]
-    """Number of impacts; for a complete sequence, those before the rest is
+    """Number of impacts; for a complete sequence, those before the remainder is
     negligible.
     """
     stuck: Bool[Array, "..."]

@@ -33,7 +33,8 @@ class Product(NamedTuple):
     determinant: Float[Array, ""]
     """Determinant of the first n columns, as a product over flights and impacts."""
     condition: Float[Array, ""]
-    """Relative error of the first n columns for a relative error of one in each factor.
+    """Condition number: relative error of the first n columns, per relative error of
+    each factor.
     """
 
 
@@ -47,8 +48,9 @@ def product_of(
     """Multiply the transition matrices of the flights and the saltation matrices
     between them.
 
-    **Arguments:** `build(parameters)` returns the system; the state at the start of the
-    first piece; whether any piece is in contact (static).
+    **Arguments:** `build(parameters)`, which returns the system; the `parameters`; the
+    `state` at the start of the first piece; the `pieces`; and `sticks`, whether any
+    piece is in contact (static).
     """
     n, q = state.shape[0], parameters.shape[0]
     pieces = with_all_constraints(build(parameters), pieces, state)
@@ -85,7 +87,7 @@ def product_of(
 
 
 def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
-    """Return the flags of contact for every constraint of the system."""
+    """Return the pieces with a contact flag for every constraint of the system."""
     gap = jax.eval_shape(system.gap, pieces.start[0], state)
     missing = (gap.shape[0] if gap.shape else 1) - pieces.contact.shape[1]
 

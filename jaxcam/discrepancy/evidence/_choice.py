@@ -78,7 +78,7 @@ class Choice:
 def choose(question: Question, trials: Trials, seed: int) -> Choice:
     """Search, drop terms that depend on a few blocks, and test the residuals.
 
-    A term in doubt is named if no structure remains with it but much remains without
+    A doubtful term is named if no structure remains with it but much remains without
     it, provided that it improves the prediction of held-out data.
     """
     found = Search(trials).run()

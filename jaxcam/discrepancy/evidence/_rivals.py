@@ -29,8 +29,8 @@ def rivals(
 ) -> tuple[Rival, ...]:
     """Return the best of the other fits, the best first, one for each set of parts.
 
-    A block bootstrap draws stretches of the records, the same ones for all fits. No fit
-    is repeated: each bootstrap sample weights the costs of the stretches.
+    The block bootstrap draws the same blocks of the recordings for all fits. No fit is
+    repeated: each bootstrap sample weights the costs of the blocks.
     """
     ranked = sorted(
         (one for one in tried if one is not found), key=lambda one: one.score

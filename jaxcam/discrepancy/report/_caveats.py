@@ -229,11 +229,11 @@ def _far(trials: Trials) -> Caveat:
 
 def _tie(best: Trial, other: Trial) -> Caveat:
     names = tuple(sorted(other.names))
-    written = ("+".join(names) or "none").replace("_", " ")
+    written = ("+".join(names) or "the textbook model").replace("_", " ")
     return Caveat(
         Reason.TIE,
         f"These recordings cannot distinguish {listed(sorted(best.names))} from "
         f"{written}: the BIC differs by only {other.bic - best.bic:.1f}. Record "
-        "larger and smaller bounces, and speeds further apart.",
+        "motions of larger and smaller amplitude, and speeds further apart.",
         names,
     )

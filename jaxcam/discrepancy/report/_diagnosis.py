@@ -195,7 +195,7 @@ class Diagnosis:
         return self.after.model(record)
 
     def system(self, record: int | str = 0) -> HybridSystem:
-        """Return the system with the named terms and no others.
+        """Return the system with the named terms and the functions of unnamed effects.
 
         The drive turns at the speed of the given recording. Sensor errors are not
         included. A force with an internal state is included with that state: the system

@@ -61,12 +61,12 @@ _WORDS = {
     "saturating": "changes with the {x} around {a}, over about {width}, and saturates",
     "fast": "acts only where the speed exceeds {edge}, and grows from there",
     "power of speed": "grows as the speed to the power {power}",
-    "harmonic 1": "varies once per turn",
-    "harmonic 2": "varies twice per turn",
-    "harmonic 3": "varies three times per turn",
-    "half turn": "acts in one half of each turn, from {x} {turn}",
-    "arc": "acts only in part of each turn, around {x} {turn}, over +-{half}",
-    "bump in turn": "acts only around {x} {turn} in each turn, over about {half}",
+    "harmonic 1": "varies once per cycle",
+    "harmonic 2": "varies twice per cycle",
+    "harmonic 3": "varies three times per cycle",
+    "half turn": "acts in one half of each cycle, from {x} {turn}",
+    "arc": "acts only in part of each cycle, around {x} {turn}, over +-{half}",
+    "bump in turn": "acts only around {x} {turn} in each cycle, over about {half}",
 }
 _THINGS = {
     "force": "a force",

@@ -21,7 +21,7 @@ def with_terms(
     """Add physics to a model, for `fit` or `fit_free_run`.
 
     Args:
-        model: The model of the bare system.
+        model: The model without these terms.
         parameters: Its parameters.
         terms: Names from `library(extended=True)`, or terms of your own that act on the
             first coordinate. Their strengths are initially zero.

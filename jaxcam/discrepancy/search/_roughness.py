@@ -40,8 +40,9 @@ def roughness(
     Processes for Machine Learning 2006, eq. 2.30, in terms of information and score.
 
     **Arguments:** information and score without the prior of the coefficients; rows of
-    the free parameters, and of the coefficients of the function, the jump last; their
-    values at the point; the policy. The gain is relative to the likelihood there.
+    the free parameters, and of the coefficients of the function, of which the last is
+    its jump at zero velocity; the values of these coefficients at the point; the
+    policy. The gain is relative to the likelihood at the point.
     """
     inside, pull = beside(information, score, free, own, policy.alike)
     count = len(own) - 1
@@ -62,8 +63,8 @@ def roughness(
 def occam(
     information, free, own, spread: Float[np.ndarray, " k"], alike: float
 ) -> float:
-    """Return the Occam factor of a function: `log det(1 + S A S)` for prior errors
-    S.
+    """Return the Occam factor of a function, `log det(1 + S A S)`, with the information
+    A and the prior standard deviations S of its coefficients.
     """
     inside, _ = beside(information, np.zeros(len(information)), free, own, alike)
     values = np.linalg.eigvalsh(inside * np.outer(spread, spread))
@@ -73,8 +74,9 @@ def occam(
 def beside(information, score, free, own, alike: float):
     """Return information and score of some rows, with the free parameters eliminated.
 
-    Combinations that the free parameters represent to within `alike` of their
-    information have neither, because the values would be rounding errors.
+    If the free parameters represent a combination so well that less than a fraction
+    `alike` of its information remains, both are zero, because only rounding errors
+    would be left.
     """
     free = np.setdiff1d(free, own)
     free = free[np.diag(information)[free] > 0]
@@ -95,7 +97,8 @@ def _gain(inside, pull, spread, value) -> float:
     used = spread > 0
     spread, value = spread[used], value[used]
     inside, pull = inside[np.ix_(used, used)], pull[used]
-    # in units of the prior errors; rounding must not make information negative
+    # in units of the prior standard deviations; rounding must not make information
+    # negative
     values, vectors = np.linalg.eigh(inside * np.outer(spread, spread))
     values = 1 + np.maximum(values, 0.0)
     here = value / spread

@@ -77,7 +77,7 @@ class Free:
 
     @property
     def spread(self) -> np.ndarray:
-        """Return prior standard errors of the coefficients of a sum of sines, or
+        """Return prior standard deviations of the coefficients of a sum of sines, or
         significant changes of the parameters of a form.
         """
         if self.primitive is None:
@@ -137,7 +137,7 @@ def free_term(
 
 
 def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
-    """Return the prior standard errors of the coefficients of a function, the jump
+    """Return the prior standard deviations of the coefficients of a function, the jump
     last.
     """
     variances = family.variances(_SINES[family.where], roughness.length)

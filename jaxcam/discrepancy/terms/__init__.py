@@ -1,7 +1,7 @@
 """Physics that a model may lack, and systems that include it.
 
-A `Term` has a strength; a `Shape` is a free function that shows where something is
-missing and how it varies.
+A `Term` has one or more strengths; a `Shape` is a free function that shows where
+physics is missing and on what it depends.
 """
 
 from ._coordinates import coordinates as coordinates

@@ -1,4 +1,4 @@
-"""Friction with its own speed or position scale."""
+"""Dry friction that varies with speed (Stribeck) or with position."""
 
 from typing import ClassVar
 

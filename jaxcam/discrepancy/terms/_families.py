@@ -38,11 +38,13 @@ class Factor(enum.StrEnum):
 class Family:
     """All functions of one argument, times a factor, that act in the same place.
 
-    - `where`: flight (a force), impact (a factor on the restitution), contact (a
-        surface) or sensor (an addition to its reading). `argument` between `low` and
-        `high`; `factor` of a force.
-    - `middle`: position from which a deflection is measured. `slip`: speed below which
-        the sign of the velocity is smoothed.
+    - `where`: `flight` (a force), `impact` (a factor on the coefficient of
+        restitution), `contact` (a correction of the surface) or `sensor` (an addition
+        to its reading).
+    - `argument`: the variable, between `low` and `high`; `factor`: the factor of a
+        force.
+    - `middle`: position from which a deflection is measured.
+    - `slip`: speed below which the sign of the velocity is smoothed.
     - `motion_unit`: unit of the coordinate.
     """
 

@@ -104,7 +104,7 @@ class FreeFunction(Term):
 
     @property
     def _knots(self):
-        """Return where the spline begins, and the distance of its knots."""
+        """Return where the spline begins, and the spacing of its knots."""
         width = self.high - self.low
         return self.low - _BEYOND * width, width * (1 + 2 * _BEYOND) / (_KNOTS - 3)
 
@@ -152,8 +152,8 @@ class FreeFunction(Term):
     def at(self, argument, direction: Any = 0.0):
         """Return the function without its factor.
 
-        A sum of sines is constant beyond the ends of its range. A form continues there
-        by a share of the range, because some velocities are outside.
+        A sum of sines is constant beyond the ends of its range. A form continues beyond
+        them by a fraction of the range, because some velocities are outside the range.
 
         **Arguments:** the argument, and the direction of motion.
         """
@@ -217,7 +217,7 @@ class FreeForce(FreeFunction):
 
 
 class FreeRestitution(FreeFunction):
-    """A factor on the restitution coefficient, `exp` of the function."""
+    """A factor on the coefficient of restitution, `exp` of the function."""
 
     name: ClassVar[str] = "free_restitution"
 

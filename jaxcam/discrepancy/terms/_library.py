@@ -1,4 +1,4 @@
-"""The library: effects that models of machines most often omit."""
+"""The library of effects that models of machines often omit."""
 
 import math
 from collections.abc import Mapping
@@ -60,7 +60,7 @@ class CoulombFriction(Term):
     """Dry friction, `-fc sign(v)`, which holds a body at rest under a force below `fc`.
 
     The sign is smoothed to `tanh(v / slip)` for the integration; `slip` (rad/s) is far
-    below the speeds that determine the friction. While friction holds the body, the
+    below the usual speeds of the motion. While friction holds the body, the
     `tanh` is shifted so that it balances the applied force at rest, and the body does
     not creep.
     """
@@ -120,7 +120,9 @@ class NonlinearSpring(Term):
 
 
 class RestitutionVelocity(Term):
-    """Restitution that falls with the approach speed, `r0 (1 + v / reference)^-rb`."""
+    """Coefficient of restitution that decreases with approach speed v,
+    `r0 (1 + v / reference)^-rb`.
+    """
 
     name: ClassVar[str] = "restitution_velocity"
     sentence: ClassVar[str] = (
@@ -138,10 +140,10 @@ class RestitutionVelocity(Term):
 
 
 class CamProfileError(Term):
-    """A cam that is out of round by `run cos(2 phi + lead)`."""
+    """A cam that is out of round by `run cos(2 phi + lead)`; phi is the drive angle."""
 
     name: ClassVar[str] = "cam_profile_error"
-    sentence: ClassVar[str] = "an error of the surface, twice per turn"
+    sentence: ClassVar[str] = "an error of the cam profile, twice per revolution"
     where: ClassVar[str] = Where.CONTACT
     region: ClassVar[str] = "at impacts and in contact, as a function of drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
@@ -153,7 +155,7 @@ class CamProfileError(Term):
 
 
 class ExternalVibration(Term):
-    """A foundation that shakes, `ext sin(2 pi fe t + phase)`.
+    """A vibration of the foundation, `ext sin(2 pi fe t + phase)`.
 
     The fitted parameters are the amplitudes of sine and cosine, in which the term is
     linear.
@@ -185,14 +187,14 @@ class ExternalVibration(Term):
 
 
 class DriveRipple(Term):
-    """A drive whose speed varies with its own angle, `w (1 + eps cos(phi - psi))`.
+    """A drive whose speed varies with its angle phi, `w (1 + eps cos(phi - psi))`.
 
-    The ripple is found in the channel of the drive itself; the motion is computed from
-    that channel in any case.
+    The ripple is identified in the channel of the drive angle. The motion is computed
+    from that channel, with or without this term.
     """
 
     name: ClassVar[str] = "drive_ripple"
-    sentence: ClassVar[str] = "a ripple of the drive speed, once per turn"
+    sentence: ClassVar[str] = "a ripple of the drive speed, once per revolution"
     where: ClassVar[str] = Where.DRIVE
     region: ClassVar[str] = "in the drive angle itself"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 10"
@@ -257,7 +259,7 @@ class SpeedDependentBounce(Term):
     )
     where: ClassVar[str] = Where.IMPACT
     region: ClassVar[str] = "at impacts, as a function of drive speed"
-    source: ClassVar[str] = "Chong 2016, section 4.6.1 (Figure 4.15)"
+    source: ClassVar[str] = "Alzate, PhD thesis, Naples, 2008, section 4.6.1"
     listed: ClassVar[bool] = False
     br: float = strength("s/rad", 1e-3)
 

@@ -1,4 +1,4 @@
-"""Scales of the recorded motion, used to scale the terms."""
+"""Scales of the recorded motion, from which terms take their constants."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,8 @@ class MotionScales(NamedTuple):
     """Range of a coordinate, in its unit, and of its velocity.
 
     `low`, `high`: smallest and largest position; `fast`: a speed that is rarely
-    exceeded;
-    `push`: the usual acceleration; `slip`: speed over which dry friction changes sign.
+    exceeded; `push`: the usual acceleration; `slip`: speed over which dry friction
+    changes sign.
     """
 
     low: float = -1.0

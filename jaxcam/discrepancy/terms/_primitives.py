@@ -40,15 +40,16 @@ class Place(NamedTuple):
 
 
 class Primitive(NamedTuple):
-    """A form: its `name`, `function(place, numbers)`, and the values of its parameters.
+    """A form: its `name`, `function(place, numbers)` and properties of its parameters.
 
     - `starts`: for each parameter but the first, values from which a fit may start.
     - `scales`: for each parameter but the first, a significant change.
-    - `jump`: jump of the form at a change of sign of the velocity, in halves of its
-      size.
+    - `jump`: half the jump of the form at a change of sign of the velocity, in units of
+      its size.
     - `odd`: whether the form is multiplied by the direction of motion.
-    - `places`: the parameters that are positions, as shares of the range; of two, the
-      first is the lower one. `positive`: those that are lengths or exponents.
+    - `places`: the parameters that are positions, as shares of the range; if there are
+      two, the first is the lower one.
+    - `positive`: the parameters that are lengths or exponents.
     - `ends`: further positions, as a function of the parameters.
     """
 

@@ -34,8 +34,8 @@ _FAULTS = ("gain", "offset", "lag")
 
 
 def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter]:
-    """Return the gain, offset and lag of that sensor as parameters, unless they already
-    are.
+    """Return the gain, offset and lag of that sensor as parameters, except those that
+    are parameters already.
     """
     known = set(own_faults(model, parameters))
     taken = [one.where(model) for one in parameters if one.name in known]

@@ -74,8 +74,9 @@ def strength(
         upper: Upper bound.
         default: Value of a new term.
         inner: Whether it has no effect while the strengths are zero, like an edge or a
-            frequency. The fit starts from the best of the term's `starts`; without
-            `starts` it is a frequency (Hz) that a scan finds.
+            frequency. The fit starts from the best of the values that the term's
+            method `starts` returns; without any, the parameter must be a frequency
+            (Hz), which a scan finds.
 
     Returns:
         A field.

@@ -1,4 +1,4 @@
-"""Parts of a motion in which physics can be missing."""
+"""Places where physics can be missing: flight, impact, contact, drive and sensor."""
 
 import enum
 

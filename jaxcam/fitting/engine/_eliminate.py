@@ -17,7 +17,7 @@ from ._linearise import Blocks
 from ._program import program
 
 
-# Fraction of the information used to hold an unconstrained state in place
+# Regularisation of the states, as a fraction of their own information
 LEAST = 1e-13
 
 
@@ -44,7 +44,7 @@ def eliminate_states(blocks: Blocks, least: float | Array = LEAST) -> Reduced:
 
     Args:
         blocks: The normal equations.
-        least: Share of its own information by which each state is held in place.
+        least: Regularisation of each state, as a fraction of its own information.
 
     Returns:
         A [`jaxcam.fitting.engine.Reduced`][].

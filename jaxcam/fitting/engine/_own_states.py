@@ -136,7 +136,8 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
     def one(values, states, pieces):
         model = layout.at(values)
         size = states.shape[-1] - len(filtered_channels(model))
-        ends, _ = jax.vmap(lambda *a: flown(model, *a))(states, *flight_inputs(pieces))
+        inputs = states, *flight_inputs(pieces)
+        ends, _ = jax.vmap(lambda *a: flown(model, *a, pieces.substeps))(*inputs)
         part = pieces.flown
         times = part.start + part.step * part.place.shape[-2]
 

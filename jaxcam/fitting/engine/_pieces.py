@@ -58,6 +58,7 @@ class Pieces(eqx.Module):
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
     - `drive_error`: standard errors of the drive's angle and rate, for each recording.
+    - `substeps`: number of parts into which a prediction divides each step.
     """
 
     flown: Samples
@@ -73,6 +74,7 @@ class Pieces(eqx.Module):
     rest_rate: Float[Numbers, "r kc n1"]
     reach: Float[Numbers, " r"]
     drive_error: Float[Numbers, "r 2"]
+    substeps: int = eqx.field(static=True, default=1)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -66,7 +66,12 @@ from ._pieces import gather, Pieces, Span
 from ._problem_checks import parameter_places, refuse_not_finite, refuse_repeated
 from ._sharpness import joint_sharpness
 from ._starts import state_size, suggested_starts
-from ._step_size import fine_enough, follows_inputs, longest_flight
+from ._step_size import (
+    enough_substeps,
+    followed_by_cubics,
+    follows_inputs,
+    longest_flight,
+)
 
 
 # Initial and maximum number of steps of a piece
@@ -160,7 +165,7 @@ class Problem:
             if one.known is not None:
                 values[:, column] = one.known
         measured = model.drive.channel if isinstance(model.drive, Input) else None
-        steps, first, extras = _STEPS, _STEPS, None
+        steps = _STEPS
         # filtered channels are smooth even where the motion is not
         curved = [name for name in model.sensors if not model.sensors[name].filtered]
         # contact does not show which of several coordinates are at rest
@@ -175,15 +180,11 @@ class Problem:
             states, guess = suggested_starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
             refuse_not_finite(layout, segments, pieces, point)
-            if extras is None:
-                # the error scale of the first steps is sufficient for all
-                extras, first = joint_sharpness(layout, pieces, point, guess), steps
-            fine = fine_enough(layout, pieces, extras, point, longest_flight(cuts))
-            if steps >= _MOST_STEPS or fine:
+            if steps >= _MOST_STEPS or followed_by_cubics(layout, pieces, point):
                 break
             steps *= 2
-        if steps > first:
-            extras = joint_sharpness(layout, pieces, point, guess)
+        extras = joint_sharpness(layout, pieces, point, guess)
+        pieces = enough_substeps(layout, pieces, extras, point, longest_flight(cuts))
         pieces = jax.tree.map(jnp.asarray, pieces)
         point = own_states(layout, pieces, extras, point)
         return Problem(

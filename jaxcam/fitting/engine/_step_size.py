@@ -1,5 +1,7 @@
 """Check that the steps of pieces are short enough for the model and its sensors."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,8 +14,11 @@ from ._predict import fly
 from ._program import program
 
 
-# Allowed change (in units of the noise) when the steps are halved
+# Allowed change (in units of the error of a piece's state) when the substeps are halved
 _STEP_ERROR = 0.01
+_MOST_SUBSTEPS = 16
+# Allowed error (in units of the noise) of the cubics between the ends of the steps
+_CUBIC_ERROR = 0.05
 # Number of pieces above which the limit decreases, because errors accumulate along a
 # flight
 _LONG = 16
@@ -42,33 +47,78 @@ def follows_inputs(model: Model, segments, pieces: Pieces) -> bool:
     return all(longest * corner <= _FILTER_STEP for corner in corners)
 
 
-def fine_enough(
+def followed_by_cubics(layout: Layout, pieces: Pieces, point: Point) -> bool:
+    """Return whether the cubics between the ends of the steps are close to the motion.
+
+    They are compared with the integrated motion in the middle of each step.
+    """
+    off = np.abs(_off_middles(layout, pieces, point))
+    sensors = layout.model.sensors.values()
+    floors = np.array([float(one.floor / abs(one.gain)) for one in sensors])
+    inside = pieces.exists[..., None]
+    return bool(np.max(np.where(inside, off / floors, 0.0)) < _CUBIC_ERROR)
+
+
+def enough_substeps(
     layout: Layout, pieces: Pieces, extras: Extras, point: Point, flight: int
-) -> bool:
-    """Return whether halving the steps changes all states by less than their errors.
+) -> Pieces:
+    """Return the pieces with enough substeps that doubling these changes all states by
+    less than their errors.
 
     **Arguments:** `flight` is the number of pieces in the longest flight.
     """
-    part = pieces.flown
-    rate = np.repeat(pieces.rate, 2, axis=-1)
-    # a quarter of a step before and after the middle, because the drive turns uniformly
-    quarter = np.asarray(part.step)[..., None] / 4
-    sign = np.tile([-1.0, 1.0], pieces.rate.shape[-1])
-    half = np.repeat(pieces.angle, 2, axis=-1) + sign * quarter * rate, rate
-    coarse = _ends(layout, point, part.start, part.step, pieces.angle, pieces.rate)
-    fine = _ends(layout, point, part.start, part.step / 2, *half)
-    change = np.abs(coarse - fine) / np.asarray(extras.sharpness.piece)
     # errors of the same sign accumulate over a flight of many pieces, like a frequency
     # error
     part_of_error = _STEP_ERROR / max(1.0, flight / _LONG) ** 1.5
-    return bool(np.max(np.where(pieces.exists[..., None], change, 0.0)) < part_of_error)
+    scale = np.asarray(extras.sharpness.piece)
+    inside = np.asarray(pieces.exists)[..., None]
+    coarse = _ends(layout, pieces, point)
+    while pieces.substeps < _MOST_SUBSTEPS:
+        finer = dataclasses.replace(pieces, substeps=2 * pieces.substeps)
+        fine = _ends(layout, finer, point)
+        change = np.abs(coarse - fine) / scale
+        if np.max(np.where(inside, change, 0.0)) < part_of_error:
+            break
+        pieces, coarse = finer, fine
+    return pieces
 
 
 @program
-def _ends(layout: Layout, point: Point, start, step, angle, rate):
-    def one(values, *piece):
-        model = layout.at(values)
-        return jax.vmap(lambda *inputs: fly(model, *inputs)[0])(*piece)
+def _ends(layout: Layout, pieces: Pieces, point: Point):
+    def one(model, substeps, *piece):
+        return fly(model, *piece, substeps)[0]
 
-    drive = (jnp.asarray(part) for part in (start, step, angle, rate))
-    return jax.vmap(one)(point.values, point.states, *drive)
+    return _of_each(layout, pieces, point, one)
+
+
+@program
+def _off_middles(layout: Layout, pieces: Pieces, point: Point):
+    """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
+
+    def one(model, substeps, state, start, step, angle, rate):
+        del substeps
+        # both halves of a step have its drive, which turns uniformly
+        both = (jnp.repeat(part, 2, axis=-1) for part in (angle, rate))
+        angles, rates = both
+        if not isinstance(model.drive, Input):
+            quarter = jnp.tile(jnp.array([-0.25, 0.25]), angle.shape[-1]) * step
+            angles = angles + quarter * rates
+        _, halves = fly(model, state, start, step / 2, angles, rates)
+        left, middle, right = halves.left[::2], halves.right[::2], halves.right[1::2]
+        bend = (halves.left_rate[::2] - halves.right_rate[1::2]) * step / 8
+        return jnp.max(jnp.abs((left + right) / 2 + bend - middle), axis=0)
+
+    return _of_each(layout, pieces, point, one)
+
+
+def _of_each(layout: Layout, pieces: Pieces, point: Point, one):
+    """Apply a function to each piece and the model of its recording."""
+    part = pieces.flown
+
+    def record(values, *inputs):
+        model = layout.at(values)
+        return jax.vmap(lambda *piece: one(model, pieces.substeps, *piece))(*inputs)
+
+    drive = (part.start, part.step, pieces.angle, pieces.rate)
+    inputs = (jnp.asarray(one) for one in drive)
+    return jax.vmap(record)(point.values, point.states, *inputs)

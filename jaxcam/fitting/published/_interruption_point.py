@@ -30,7 +30,7 @@ def interruption_of_chattering(
     Args:
         system: A system with two states, one constraint and a period.
         where: Selects the parameter.
-        bracket: Two values of the parameter, well to either side of the published one,
+        bracket: Two values of the parameter, well on either side of the published one,
             with complete chatter at only one of them.
         periods: Number of forcing periods from release to the release after sticking.
 

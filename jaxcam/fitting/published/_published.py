@@ -97,7 +97,7 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    The method is Levenberg-Marquardt (MINPACK), with larger errors far from the data.
+    The method is Levenberg-Marquardt (MINPACK), in stages of decreasing errors.
 
     Args:
         model: A system, or a module that contains one, at the nominal values.

@@ -1,4 +1,4 @@
-"""Crossings of a Poincare section."""
+"""Crossings of a Poincaré section."""
 
 import jax
 import numpy as np

@@ -162,7 +162,7 @@ class Trajectory(Printed):
         return self.at(np.minimum(times, end))
 
     def section(self, function, direction: int = 0):
-        """Return the crossings of a Poincare section `function(t, state) = 0`.
+        """Return the crossings of a Poincaré section `function(t, state) = 0`.
 
         Each integration step is searched in eight pieces; two crossings within one
         piece are missed.

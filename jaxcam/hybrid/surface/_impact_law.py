@@ -24,8 +24,8 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
     The state is moved onto the constraint, and its normal velocity is made negative:
     the coefficient is minus the ratio of the normal velocities after and before an
     impact (thesis, eq. 2.27). For a state at rest on the constraint, the normal
-    velocity is only rounding error, so it is replaced by a larger value, or by 1 if all
-    terms are zero.
+    velocity is only rounding error, so it is replaced by a larger value, or by 1 if it
+    is exactly zero and has no rounding error.
     """
     number = gaps(system, t, x).shape[0]
     found = []

@@ -179,7 +179,7 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
     """Return q with F_s = F - sum q_k D_k over the constraints in contact.
 
     With one constraint, q = a. The contact force is compressive while q < 0, and the
-    constraint releases when q rises through zero. For constraints that are not in
+    contact ends when q rises through zero. For constraints that are not in
     contact, q is zero.
     """
     acceleration = normal_acceleration(system, t, x)

@@ -108,8 +108,8 @@ def release_point(
         samples: Number of points in the scan.
 
     Returns:
-        The release. If contact is maintained at `t`, the state of contact at `t`, with
-            `holds` = 1; `holds` is 2 if there is no contact in the period.
+        The release, with `holds` = 0. If contact is maintained at `t`, the state of
+            contact at `t`, with `holds` = 1; `holds` is 2 if there is no contact.
 
     Examples:
         >>> from jaxcam.hybrid.surface import release_point

@@ -110,7 +110,7 @@ class Comparison:
             table.add_column(heading, no_wrap=True)
         for heading in ("pieces", "rms", "noise", "ratio"):
             table.add_column(heading, justify="right", no_wrap=True)
-        table.add_column("most clearly in")
+        table.add_column("most significant at")
         for row in self.rows:
             table.add_row(
                 f"{row.mode} of {_plain_channel(row)}" if several else row.mode,

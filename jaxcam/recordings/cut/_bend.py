@@ -44,7 +44,7 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 
 
 class Seen(NamedTuple):
-    """Information of one recording on the coefficients of a surface, about some values.
+    """Information of one recording on the coefficients of a surface, linearised.
 
     `normal` `(p, p)` and `target` `(p,)`; the coefficients of a bend come last.
     """

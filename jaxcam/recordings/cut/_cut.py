@@ -249,7 +249,7 @@ def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary
     late = landing.time + 2 * landing.stderr
     if release.time > late:
         return release
-    evidence = "unobservably low bounces may last until here"
+    evidence = "flights too low to be observed may last until here"
     return Boundary(min(late, latest), landing.stderr, "impact", evidence)
 
 

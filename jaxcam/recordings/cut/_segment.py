@@ -110,7 +110,8 @@ def segment(
             observed.
 
     Returns:
-        The parts. Every impact in `impacts` has a positive approach speed.
+        The segmented recording. Every impact in `impacts` has a positive approach
+            speed.
 
     Raises:
         ValueError: A surface does not have one number per sample, or the upper surface

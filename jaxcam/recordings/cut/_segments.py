@@ -49,7 +49,7 @@ class Flight:
 
 @dataclasses.dataclass(frozen=True)
 class Contact:
-    """A stretch within the noise of the surface; samples `first <= i < last`.
+    """An interval within the noise of the surface; samples `first <= i < last`.
 
     It begins with impacts that are too weak to be observed.
     """

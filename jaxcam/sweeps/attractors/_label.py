@@ -21,7 +21,7 @@ _STEADY = 0.9
 
 
 class Labels(NamedTuple):
-    """The attractor type of each lane, as small integers.
+    """The attractor type of each motion, as small integers.
 
     `turns` is the period in forcing periods (or in points, on a section that is not
     sampled once per period), or one of `APERIODIC`, `ESCAPED`, `FAILED` and `OUTSIDE`;
@@ -38,19 +38,20 @@ class Labels(NamedTuple):
 
 
 def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
-    """Return the smallest period of each lane, in points; 0 if there is none.
+    """Return the smallest period of each motion, in points; 0 if there is none.
 
     A motion that spirals in towards an orbit temporarily appears to have a multiple of
     its period. It counts as non-periodic until its points stop approaching the orbit.
 
     Args:
-        states: Samples, shape `(lanes, keep, n)`; periods up to `keep / 2` are
+        states: Samples, shape `(motions, keep, n)`; periods up to `keep / 2` are
             detected, so each is observed twice.
         period_tolerance: Allowed difference of two states, relative to `sizes`.
-        sizes: Scale of each component, shape `(lanes, n)`; default: its largest value.
+        sizes: Scale of each component, shape `(motions, n)`; default: its largest
+            value.
 
     Returns:
-        Shape `(lanes,)`.
+        Shape `(motions,)`.
     """
     states = np.asarray(states, dtype=float)
     lanes, keep, _ = states.shape
@@ -90,7 +91,7 @@ def _still_nearing(states, n: int) -> np.ndarray:
 def label(
     samples: Samples, period_tolerance: float = 1e-6, impacting: bool = True, sizes=None
 ) -> Labels:
-    """Return the label of each lane.
+    """Return the label of each motion.
 
     Args:
         samples: Samples of a section.

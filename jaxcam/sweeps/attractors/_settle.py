@@ -25,14 +25,14 @@ def settle(
 
     Args:
         section: The section.
-        states: Initial states, shape `(lanes, n)`.
+        states: Initial states, shape `(motions, n)`.
         turns: Number of periods.
         keep: Number of samples to keep.
         period_tolerance: Tolerance for detecting periods.
         reruns: Number of extensions of non-periodic runs, each twice as long as the
             previous one.
         where: Selects one or more parameters.
-        values: Value of the parameter in each lane.
+        values: Value of the parameter in each motion.
         progress: Called with the fraction of periods completed.
 
     Returns:

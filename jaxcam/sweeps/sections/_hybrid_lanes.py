@@ -21,8 +21,9 @@ _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
 
 
 def chunk_rows(width: int) -> int:
-    """Return the number of attempts between two checks of the batch, a compromise
-    between waste and checks.
+    """Return the number of attempted steps between two checks for finished motions.
+
+    Frequent checks take time; rare ones leave finished motions in the batch.
     """
     # a small batch gains from fewer checks
     return 1024 if width < 16 else 64
@@ -31,7 +32,7 @@ def chunk_rows(width: int) -> int:
 def smallest_gaps(
     system: HybridSystem, t0, states, where=None, values=None, room: float = 0.0
 ):
-    """Return the smallest gap of each state at `t0`, shape `(lanes,)`.
+    """Return the smallest gap of each state at `t0`, shape `(motions,)`.
 
     `room` times its resolution is added to each gap.
     """
@@ -82,8 +83,8 @@ def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.nd
 
 
 def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.ndarray:
-    """Return the length of a period (s) in each lane, shape `(lanes,)`, or `(1,)` if
-    equal.
+    """Return the length of a period (s) of each motion, shape `(motions,)`, or `(1,)`
+    if equal.
 
     Raises:
         ValueError: The system has no period and none is given.
@@ -99,7 +100,7 @@ def turn_lengths(system: HybridSystem, period, where=None, values=None) -> np.nd
 
 
 def lane_sizes(system: HybridSystem, times, states, turns, where=None, values=None):
-    """Return the scale of each component of each motion, shape `(lanes, n)`."""
+    """Return the scale of each component of each motion, shape `(motions, n)`."""
     batched, shared = split_lanes(as_arrays(system), where, values)
     times, turns = (
         jnp.broadcast_to(jnp.asarray(x, float), (len(states),)) for x in (times, turns)
@@ -108,17 +109,17 @@ def lane_sizes(system: HybridSystem, times, states, turns, where=None, values=No
 
 
 def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
-    """Run the motions that can start, in blocks of few different widths.
+    """Run the motions that can start, in batches of a few different widths.
 
     Args:
         run: `run(states, values, width)` returns arrays with one row for each
-            lane, the last of them the code.
+            motion, the last of them the code.
         lanes: Maximum number of motions that advance together.
         tails: Shapes of a row of the arrays.
 
     Returns:
-        The same arrays for all lanes; rows of lanes that cannot start, or failed, are
-            NaN or zero, with the code `BEHIND` or the reason.
+        The same arrays for all motions; rows of motions that cannot start, or failed,
+            are NaN or zero, with the code `BEHIND` or the reason.
     """
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)

@@ -1,4 +1,4 @@
-"""Sample any Poincare section, one trajectory at a time."""
+"""Sample any Poincaré section, one trajectory at a time."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from ._system_section import AbstractSystemSection
 
 
 class PoincareSection(AbstractSystemSection):
-    """Poincare section: crossings of `function(t, state) = 0`, with their times.
+    """Poincaré section: crossings of `function(t, state) = 0`, with their times.
 
     Motions are computed one after the other by
     [`jaxcam.simulate`][jaxcam.hybrid.simulate], which is suitable for dozens of motions
@@ -98,8 +98,8 @@ def return_times(samples: Samples) -> np.ndarray:
         samples: Samples of a section.
 
     Returns:
-        Times (s, or iterations of a map), shape `(lanes, keep - 1)`; NaN where a point
-            is missing.
+        Times (s, or iterations of a map), shape `(motions, keep - 1)`; NaN where a
+            point is missing.
 
     Examples:
         >>> from jaxcam import sweeps

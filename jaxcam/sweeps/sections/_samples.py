@@ -9,22 +9,24 @@ class Samples(NamedTuple):
     """The last points of many motions on a section, as NumPy arrays."""
 
     states: np.ndarray
-    """Points, shape `(lanes, keep, n)`; NaN if a lane failed or has fewer points."""
+    """Points, shape `(motions, keep, n)`; NaN if a motion failed or has fewer
+    points.
+    """
     times: np.ndarray
-    """Times of the points (s, or iterations of a map), shape `(lanes, keep)`."""
+    """Times of the points (s, or iterations of a map), shape `(motions, keep)`."""
     hits: np.ndarray
-    """Number of impacts since the previous point, shape `(lanes, keep)`."""
+    """Number of impacts since the previous point, shape `(motions, keep)`."""
     rests: np.ndarray
-    """Number of completed chatter sequences since the previous point, shape `(lanes,
+    """Number of completed chatter sequences since the previous point, shape `(motions,
     keep)`.
     """
     final: np.ndarray
-    """Final state, a whole number of periods after the start, shape `(lanes, n)`."""
+    """Final state, a whole number of periods after the start, shape `(motions, n)`."""
     contact: np.ndarray
-    """Whether contact lasted throughout, shape `(lanes,)`."""
+    """Whether contact lasted throughout, shape `(motions,)`."""
     code: np.ndarray
     """0, or the reason for a failure: an index into `RESULTS`, or `BEHIND`; shape
-    `(lanes,)`.
+    `(motions,)`.
     """
 
 
@@ -33,7 +35,7 @@ BEHIND = -1
 
 
 def with_lanes(old: Samples, which, new: Samples) -> Samples:
-    """Return the samples with those of some lanes replaced."""
+    """Return the samples with those of some motions replaced."""
 
     def put(before, after):
         made = before.copy()
@@ -44,7 +46,7 @@ def with_lanes(old: Samples, which, new: Samples) -> Samples:
 
 
 def filled(samples: Samples, keep: int) -> Samples:
-    """Return the samples padded to the same number for each lane."""
+    """Return the samples padded to the same number for each motion."""
     missing = keep - samples.states.shape[1]
     if missing == 0:
         return samples

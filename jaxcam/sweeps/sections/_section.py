@@ -14,8 +14,8 @@ from ._samples import Samples
 class AbstractSection(eqx.Module):
     """A sampling method for many motions of one system.
 
-    A lane is one motion. Its samples depend only on its start and its parameters, not
-    on the other lanes; the rest of the package relies on this.
+    The samples of a motion depend only on its start and its parameters, not on the
+    other motions; the rest of the package relies on this.
     """
 
     system: AbstractVar[Any]
@@ -40,24 +40,24 @@ class AbstractSection(eqx.Module):
         """Return the last `keep` points within `turns` periods.
 
         Args:
-            states: Initial state of each lane, shape `(lanes, n)`.
+            states: Initial state of each motion, shape `(motions, n)`.
             turns: Number of periods.
             keep: Number of points.
             where: Selects one or more parameters.
-            values: Value of the parameter in each lane, shape `(lanes,)`, or one row of
-                values per lane.
+            values: Value of the parameter of each motion, shape `(motions,)`, or one
+                row of values per motion.
 
         Returns:
-            [`jaxcam.sweeps.sections.Samples`][]. A lane that cannot start has the code
-                `BEHIND` and no points.
+            [`jaxcam.sweeps.sections.Samples`][]. A motion that cannot start has the
+                code `BEHIND` and no points.
         """
 
     @abc.abstractmethod
     def starts(self, where: Callable | None = None, values=None) -> np.ndarray:
-        """Return the default initial state of each lane.
+        """Return the default initial state of each motion.
 
         Returns:
-            Shape `(lanes, n)`.
+            Shape `(motions, n)`.
 
         Raises:
             ValueError: The system has no default start.
@@ -68,7 +68,7 @@ class AbstractSection(eqx.Module):
         """Return the length of a period (s, or iterations of a map).
 
         Returns:
-            Lengths, shape `(lanes,)`, or `(1,)` if they are equal.
+            Lengths, shape `(motions,)`, or `(1,)` if they are equal.
         """
 
     def sizes(
@@ -78,14 +78,14 @@ class AbstractSection(eqx.Module):
         where: Callable | None = None,
         values=None,
     ) -> np.ndarray:
-        """Return the scale of each component in each lane.
+        """Return the scale of each component of each motion.
 
         Two states are equal if their difference is small compared with this scale. The
         default is the largest value among the initial states (`states`) and the
         samples.
 
         Returns:
-            Shape `(lanes, n)`.
+            Shape `(motions, n)`.
         """
         del where, values
         seen = np.where(np.isfinite(samples.states), np.abs(samples.states), 0.0)

@@ -1,4 +1,4 @@
-"""Figure 3.12: the branch of P(1,1) continues around its turning point."""
+"""Figure 3.12: the branch of P(1,1) continues around its fold."""
 
 from typing import TYPE_CHECKING
 

@@ -87,15 +87,15 @@ def draw(system: CamFollower) -> Figure:
         x_scale=scale,
     )  # fmt: skip
     speeds, times, _ = sticking_times(system)
-    axes[1].plot(speeds, 1e3 * times, color=FLIGHT, label="motion")
+    axes[1].plot(speeds, 1e3 * times, color=FLIGHT, label="simulated")
     speeds, times = np.array(sticking_along(branch)).T
-    axes[1].plot(speeds, 1e3 * times, "o", ms=3.5, color=SECOND, label="followed")
+    axes[1].plot(speeds, 1e3 * times, "o", ms=3.5, color=SECOND, label="continuation")
     axes[1].legend()
     for point in branch.special:
         axes[1].axvline(scale * point.parameter, color=SECOND, ls=":", lw=1.2)
     axes[1].axhline(0, color="0.4", lw=0.7)
     axes[1].set_xlabel("speed (rpm)")
-    axes[1].set_ylabel("sticking time per turn (ms)")
+    axes[1].set_ylabel("sticking time per cycle (ms)")
     return figure
 
 

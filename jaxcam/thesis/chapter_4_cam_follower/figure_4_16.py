@@ -45,4 +45,4 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("Bounces at four speeds", compute, draw)
+TARGET = Target("Rebounds at four speeds", compute, draw)

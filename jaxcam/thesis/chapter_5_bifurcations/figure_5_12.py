@@ -46,12 +46,12 @@ def compute(system: CamFollower, size: str) -> Rows:
     rows: Rows = []
     cascades = {
         "sticking orbit": ("P(inf,1)",),
-        "doublings of the orbit with one impact per turn": (
+        "period doublings of P(1,1)": (
             "P(2,2)",
             "P(4,4)",
             "P(8,8)",
         ),
-        "orbit of three turns and its doublings": ("P(3,3)", "P(6,6)", "P(12,12)"),
+        "P(3,3) and its period doublings": ("P(3,3)", "P(6,6)", "P(12,12)"),
     }
     met = 0
     for name, labels in cascades.items():
@@ -73,4 +73,6 @@ def draw(system: CamFollower, size: str) -> Figure:
     return figure
 
 
-TARGET = Target("Coexistence, from random initial states", compute, draw, sized=True)
+TARGET = Target(
+    "Coexisting attractors, from random initial states", compute, draw, sized=True
+)

@@ -70,9 +70,9 @@ def draw(system: CamFollower) -> Figure:
     axes[0].plot(speeds, 1e3 * times, color=FLIGHT)
     axes[0].axvline(end, color=IMPACT, ls=":", lw=1.2)
     axes[0].set_xlabel("speed (rpm)")
-    axes[0].set_ylabel("sticking time per turn (ms)")
+    axes[0].set_ylabel("sticking time per cycle (ms)")
     below = end - speeds
-    axes[1].loglog(below, 1e3 * times, color=FLIGHT, label="motion")
+    axes[1].loglog(below, 1e3 * times, color=FLIGHT, label="simulated")
     root = times[-1] * np.sqrt(below / below[-1])
     axes[1].loglog(below, 1e3 * root, "--", color=RECORDED, label="square root")
     axes[1].set_xlabel("speed below the interruption (rpm)")

@@ -42,7 +42,7 @@ def draw(system: CamFollower) -> Figure:
     figure, ax = plt.subplots(figsize=(7.2, 5.0))
     plotting.local_map(fitted, lobes, ax)
     ax.set_xlabel("angle at the section (rad)")
-    ax.set_ylabel("angle one turn later (rad)")
+    ax.set_ylabel("angle one cycle later (rad)")
     return figure
 
 

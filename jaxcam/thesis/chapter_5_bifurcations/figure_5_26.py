@@ -108,7 +108,7 @@ def draw(system: CamFollower) -> Figure:
         ax.set_title(name)
         ax.tick_params(labelbottom=False, labelleft=False)
     figure.supxlabel("angle at the section")
-    figure.supylabel("one turn later")
+    figure.supylabel("one cycle later")
     return figure
 
 

@@ -115,7 +115,7 @@ def draw(system: CamFollower, size: str) -> Figure:
         x = np.repeat(speeds, states.shape[1])
         ax.plot(x, states.ravel(), ".", ms=1.8, mew=0, color=colour, rasterized=True)
         ax.set_title(name)
-        ax.set_ylabel("from the sticking state (rad)")
+        ax.set_ylabel("deviation (rad)")
     axes[0].set_ylim(-6e-4, 8e-4)
     axes[1].set_xlabel("speed (rpm)")
     axes[1].ticklabel_format(axis="x", useOffset=False)

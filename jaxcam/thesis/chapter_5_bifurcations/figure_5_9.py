@@ -1,4 +1,4 @@
-"""Figure 5.9: impacts per turn, and completeness of chatter."""
+"""Figure 5.9: impacts per cycle, and completeness of chatter."""
 
 import equinox as eqx
 import jax

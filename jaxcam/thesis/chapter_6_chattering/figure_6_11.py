@@ -47,7 +47,7 @@ def draw(system: CamFollower) -> Figure:
     first, last = max(start - 5, 0), start + count
     figure, ax = plt.subplots(figsize=(7.6, 4.2))
     tau, speed = found.tau[first : last + 1], found.speed[first : last + 1]
-    ax.semilogy(1e3 * tau, speed, ".-", color=FLIGHT, lw=0.9, ms=8, label="motion")
+    ax.semilogy(1e3 * tau, speed, ".-", color=FLIGHT, lw=0.9, ms=8, label="simulated")
     predicted = hops(found, start, count)
     ax.semilogy(
         1e3 * predicted,

@@ -56,7 +56,7 @@ def draw(system: CamFollower) -> Figure:
     release = float(found.frame.release) % period
     figure, axes = plt.subplots(2, 1, figsize=(8.0, 5.6), sharex=True)
     axes[0].plot(drawn.time, drawn.gap[:, 0], color=FLIGHT)
-    axes[0].set_ylabel("above cam (rad)")
+    axes[0].set_ylabel("gap (rad)")
     axes[1].plot(times, acceleration, color=FLIGHT, label="acceleration (rad/s²)")
     axes[1].plot(times, jerk / 10, "--", color=IMPACT, label="jerk / 10 (rad/s³)")
     axes[1].plot(release, float(found.frame.jerk) / 10, "*", color=SECTION, ms=12,

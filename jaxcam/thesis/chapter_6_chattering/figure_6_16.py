@@ -1,4 +1,4 @@
-"""Figure 6.16: a full turn of the composed map, without any compensation."""
+"""Figure 6.16: one cycle of the composed map, without the printed scale factors."""
 
 import equinox as eqx
 import jax
@@ -47,4 +47,4 @@ def draw(system: CamFollower) -> Figure:
     return draw_rebuilt(found, "deviation of the angle (mrad)", 1e3)
 
 
-TARGET = Target("Section after a whole turn", compute, draw)
+TARGET = Target("Section after a complete cycle", compute, draw)

@@ -113,7 +113,7 @@ def draw(system: CamFollower) -> Figure:
     for ax in axes[-1]:
         ax.set_xlabel("time (s)")
     for ax in axes[:, 0]:
-        ax.set_ylabel("above cam (rad)")
+        ax.set_ylabel("gap (rad)")
     return figure
 
 

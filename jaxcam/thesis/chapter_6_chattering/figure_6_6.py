@@ -52,7 +52,7 @@ def draw(system: CamFollower) -> Figure:
     top = 1e3 * np.nanmax(drawn.gap[inside])
     ax.set_ylim(-0.12 * top, 1.15 * top)
     ax.set_xlabel("time from release (s)")
-    ax.set_ylabel("above cam (mrad)")
+    ax.set_ylabel("gap (mrad)")
     return figure
 
 

@@ -90,10 +90,10 @@ def draw_marks(system: CamFollower, close: bool = False) -> Figure:
         top.plot(time, height, label=name, **style)
         below.plot(time, speed, **style)
         right.plot(height, speed, **style)
-    top.set_ylabel("above cam (mrad)")
+    top.set_ylabel("gap (mrad)")
     below.set_ylabel("velocity (rad/s)")
     below.set_xlabel("time (s)")
-    right.set_xlabel("above cam (mrad)")
+    right.set_xlabel("gap (mrad)")
     right.set_ylabel("velocity (rad/s)")
     top.tick_params(labelbottom=False)
     # the section is at the end of the period, and its mark is wider
