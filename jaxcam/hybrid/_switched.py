@@ -21,11 +21,11 @@ class SwitchedSystem(HybridSystem):
     continues with the other branch. A stiffness with a corner, backlash or a relay
     therefore causes no loss of accuracy, and crossings have exact derivatives.
 
-    There are no constraints by default; define `gap` and `impact` if the system also
-    has impacts. `hysteresis` separates the two thresholds of a surface, as in a relay,
-    and `reset` defines a jump of the state. If both branches point towards a surface,
-    the motion would slide along it: the run ends there with the result
-    `RESULTS.slides`. Use a [`jaxcam.filippov.FilippovSystem`][] for such systems.
+    There are no constraints by default; define `gap` and `impact` if the system has
+    impacts, too. `hysteresis` makes a relay of a surface, and `reset` a jump of the
+    state. If both branches drive the motion into a surface, it slides along the surface
+    until one of them leads away; with dry friction, it sticks. `holding` is then the
+    ratio of static to kinetic friction.
 
     Examples:
         >>> from jaxcam.hybrid import SwitchedSystem
