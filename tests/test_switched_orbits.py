@@ -59,6 +59,7 @@ def test_the_stick_slip_cycle_has_its_period_and_multipliers():
     np.testing.assert_allclose(np.sort(np.abs(again)), found, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_branch_of_stick_slip_cycles_has_the_period_of_the_closed_form():
     """From a belt speed of 0.3 to 0.6, all periods to 1e-8."""
     found = continuation.branch(Belt(), belt_cycle(), "belt", (0.3, 0.6))
@@ -91,6 +92,7 @@ def test_the_amplitude_with_dry_friction_is_den_hartogs():
     assert float(orbit.closure) < 1e-9
 
 
+@pytest.mark.slow
 def test_the_multipliers_with_dry_friction_are_those_of_differences():
     """The monodromy matrix is that of central differences of the flow, to 1e-6."""
     orbit, step = rubbed(), 1e-5
@@ -108,6 +110,7 @@ def test_the_multipliers_with_dry_friction_are_those_of_differences():
     assert orbit.stable
 
 
+@pytest.mark.slow
 def test_a_branch_goes_on_where_the_motion_begins_to_stick():
     """Friction from 0.2 to 0.9: Den Hartog's amplitude until the mass sticks, then the
     orbit to which simulations converge, to 1e-8.
@@ -136,6 +139,7 @@ def test_a_branch_goes_on_where_the_motion_begins_to_stick():
     assert not sticks[0] and sticks[-1]
 
 
+@pytest.mark.slow
 def test_orbits_of_a_bilinear_oscillator_double_their_period():
     """A flip on the branch, and the branch of twice the period beyond it returns only
     after both turns.
