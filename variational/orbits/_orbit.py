@@ -144,16 +144,8 @@ def orbit_of(
     """
     refuse_tracers("orbit_of", "jaxcam.hybrid.flow", system, state, period, t0)
     settings = Settings(tolerance=1e-12) if settings is None else settings
-    if period is None:
-        if system.period is None:
-            raise ValueError(
-                "this system has no forcing period; pass the period of the orbit (s)"
-            )
-        period = system.period
     state = real_array(state)
-    t0, period = float(jnp.asarray(t0)), float(jnp.asarray(period))
-    if not period > 0:
-        raise ValueError(f"period is {period:g} s; give a positive one")
+    t0, period = float(jnp.asarray(t0)), _length(system, period)
     turn = simulate(system, state, t0, t0 + period, settings=settings)
     if not bool(turn.successful):
         raise ValueError(f"the run over one period did not end: {turn.result}")
@@ -186,11 +178,12 @@ def orbit_of(
             "give a state in flight or in contact"
         )
     pieces, sticks = cut_turn(impacts, contacts, state, t0, t0 + period)
+    none = jnp.zeros(0)
     if switched:
         times = jnp.asarray(t0), jnp.asarray(period)
-        made = by_flow(system, jnp.zeros(0), None, state, *times, settings, sticks)
+        made = by_flow(system, none, None, state, *times, settings, sticks)
     else:
-        made = by_product(system, jnp.zeros(0), None, state, pieces, sticks)
+        made = by_product(system, none, None, state, pieces, sticks)
     return Orbit(
         state=state,
         time=jnp.asarray(t0),
@@ -204,6 +197,20 @@ def orbit_of(
         sticks=sticks,
         switches=turn.switches,
     )
+
+
+def _length(system, period) -> float:
+    """Return the period of the orbit, by default that of the forcing."""
+    if period is None:
+        if system.period is None:
+            raise ValueError(
+                "this system has no forcing period; pass the period of the orbit (s)"
+            )
+        period = system.period
+    period = float(jnp.asarray(period))
+    if not period > 0:
+        raise ValueError(f"period is {period:g} s; give a positive one")
+    return period
 
 
 def _check_closure(miss, closure, period) -> None:

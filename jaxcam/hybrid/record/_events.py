@@ -76,7 +76,7 @@ class Contacts(Printed):
 
 
 class SwitchKind(enum.IntEnum):
-    """What happens at a switching surface."""
+    """The kinds of events at a switching surface."""
 
     CROSSES = 0
     """The motion crosses the surface."""
