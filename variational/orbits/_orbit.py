@@ -283,7 +283,9 @@ def signature_of(
         found.append((float(contacts.start[k]), 1, "stick", which))
         if bool(contacts.released[k]):
             found.append((float(contacts.end[k]), 2, "release", which))
-    for k in range(0 if switches is None else int(switches.count)):
+    if switches is None:
+        return tuple(Event(kind, which) for _, _, kind, which in sorted(found))
+    for k in range(int(switches.count)):
         kind, which = _AT_SURFACE[int(switches.kind[k])], int(switches.surface[k])
         found.append((float(switches.time[k]), 3, kind, which))
     return tuple(Event(kind, which) for _, _, kind, which in sorted(found))

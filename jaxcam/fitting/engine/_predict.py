@@ -38,8 +38,8 @@ def fly(model: Model, state, start, step, angle, rate, substeps: int = 1):
     """
     states, fields = _nodes(model, state, start, step, angle, rate, 1)
     if substeps > 1:
-        fixed = _constant((model, state))
-        fine = _nodes(*fixed, start, step, angle, rate, substeps)
+        still, begin = _constant((model, state))
+        fine = _nodes(still, begin, start, step, angle, rate, substeps)
         states, fields = (
             coarse + jax.lax.stop_gradient(better - coarse)
             for better, coarse in zip(fine, (states, fields))

@@ -86,7 +86,7 @@ def enough_substeps(
 @program
 def _ends(layout: Layout, pieces: Pieces, point: Point):
     def one(model, substeps, *piece):
-        return fly(model, *piece, substeps)[0]
+        return fly(model, *piece, substeps=substeps)[0]
 
     return _of_each(layout, pieces, point, one)
 
