@@ -96,7 +96,7 @@ def linear_pieces(
     def piece(state, start, step, *inputs):
         def predicted(state, change):
             model = model_at(change, start, step)
-            return flown(model, state, start, step, *inputs, pieces.substeps)
+            return flown(model, state, start, step, *inputs, substeps=pieces.substeps)
 
         (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
         return end_rows, rows, end, seen
@@ -204,7 +204,7 @@ def _columns(function, *args):
     return jax.vmap(pushed, out_axes=(None, -1))(*unit)
 
 
-def flown(model: Model, state, start, step, angle, rate, place, substeps: int):
+def flown(model: Model, state, start, step, angle, rate, place, *, substeps: int):
     end, nodes = fly(model, state, start, step, angle, rate, substeps)
     along = start + (jnp.arange(angle.shape[0], dtype=float) + 0.5) * step, angle, rate
     return end, samples(model, nodes, start, step, place, along)

@@ -204,7 +204,7 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 def _predicted(layout, pieces, extras, point):
     def record(pieces, extras, values, states):
         model = layout.at(values)
-        end, seen = jax.vmap(lambda *a: flown(model, *a, pieces.substeps))(
+        end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=pieces.substeps))(
             states, *flight_inputs(pieces)
         )
         resting = rested_all(model, pieces, extras)

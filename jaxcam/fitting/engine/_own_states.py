@@ -137,7 +137,9 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
         model = layout.at(values)
         size = states.shape[-1] - len(filtered_channels(model))
         inputs = states, *flight_inputs(pieces)
-        ends, _ = jax.vmap(lambda *a: flown(model, *a, pieces.substeps))(*inputs)
+        ends, _ = jax.vmap(lambda *a: flown(model, *a, substeps=pieces.substeps))(
+            *inputs
+        )
         part = pieces.flown
         times = part.start + part.step * part.place.shape[-2]
 

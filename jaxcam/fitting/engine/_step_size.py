@@ -97,12 +97,10 @@ def _off_middles(layout: Layout, pieces: Pieces, point: Point):
 
     def one(model, substeps, state, start, step, angle, rate):
         del substeps
-        # both halves of a step have its drive, which turns uniformly
-        both = (jnp.repeat(part, 2, axis=-1) for part in (angle, rate))
-        angles, rates = both
-        if not isinstance(model.drive, Input):
-            quarter = jnp.tile(jnp.array([-0.25, 0.25]), angle.shape[-1]) * step
-            angles = angles + quarter * rates
+        # drive and input are linear within a step: their values in its halves
+        angles, rates = (jnp.repeat(part, 2, axis=-1) for part in (angle, rate))
+        quarter = jnp.tile(jnp.array([-0.25, 0.25]), angle.shape[-1]) * step
+        angles = angles + quarter * rates
         _, halves = fly(model, state, start, step / 2, angles, rates)
         left, middle, right = halves.left[::2], halves.right[::2], halves.right[1::2]
         bend = (halves.left_rate[::2] - halves.right_rate[1::2]) * step / 8
