@@ -3,8 +3,7 @@
 Along the true motion of `_textbook_cases.py`, the internal state of a hysteresis is
 integrated for a grid of parameters, and its force is fitted together with a constant, a
 stiffness and a damping. Printed is what remains of the force that no linear oscillator
-has, as a share of its rms: for the parameters that the element allows, and for loading
-and unloading coefficients of any sign.
+has, as a share of its rms, for both kinds of hysteresis that a diagnosis tries.
 
     python -m benchmarks.textbook_hysteresis bouc_wen
 """
@@ -15,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from benchmarks._textbook_cases import CASES, extra_force, moved, multisine
+from jaxcam.discrepancy.search._hidden_kinds import HYSTERESIS, STIFFENING
 
 
 # Points of the motion per sample
@@ -71,23 +71,19 @@ def main() -> None:
     args = parser.parse_args()
     case, rng = CASES[args.case], np.random.default_rng(args.seed)
     motion = moved(case, multisine(case, 1.0, rng))
-    limits, d, n = np.geomspace(0.05, 20, 14), np.linspace(0.5, 1.5, 5), (0.5, 1.0, 2.0)
-    limit, d, n = _grid(limits, d, n)
-    loading = limit**-n
-    left = remaining(case, motion, loading, (1 - 2 * d) * loading, n)
-    k = int(np.argmin(left))
-    print(
-        f"{args.case}: the element leaves {left[k]:.3f} of the force at best "
-        f"(limit {limit[k]:.3g}, d {d[k]:g}, n {n[k]:g})"
-    )
-    coefficients = np.linspace(-4, 4, 33)
-    loading, unloading, n = _grid(coefficients, coefficients, (1.0,))
-    left = remaining(case, motion, loading, unloading, n)
-    k = int(np.argmin(left))
-    print(
-        f"  coefficients of any sign leave {left[k]:.3f} "
-        f"(loading {loading[k]:g}, unloading {unloading[k]:g}, n 1)"
-    )
+    for kind, limits, betas in (
+        (HYSTERESIS, np.geomspace(0.05, 20, 14), np.linspace(0.5, 1.5, 5)),
+        (STIFFENING, np.geomspace(0.05, 20, 14), np.linspace(-6, 0, 13)),
+    ):
+        limit, beta, n = _grid(limits, betas, (0.5, 1.0, 2.0))
+        sign = 1 if kind is HYSTERESIS else -1
+        loading = sign * limit**-n
+        left = remaining(case, motion, loading, (1 - 2 * beta) * loading, n)
+        k = int(np.argmin(left))
+        print(
+            f"{args.case}: a {kind.name} leaves {left[k]:.3f} of the force "
+            f"(limit {limit[k]:.3g}, beta {beta[k]:g}, power {n[k]:g})"
+        )
 
 
 if __name__ == "__main__":

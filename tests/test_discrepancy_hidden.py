@@ -13,7 +13,12 @@ from scipy.integrate import solve_ivp
 
 from jaxcam import simulate
 from jaxcam.discrepancy.report._hidden import hidden_formula
-from jaxcam.discrepancy.search._hidden_kinds import HYSTERESIS, RELAXATION, RESONANCE
+from jaxcam.discrepancy.search._hidden_kinds import (
+    HYSTERESIS,
+    RELAXATION,
+    RESONANCE,
+    STIFFENING,
+)
 from jaxcam.discrepancy.search._hidden_signals import Driven
 from jaxcam.discrepancy.search._hidden_state import Hidden
 from jaxcam.discrepancy.terms import (
@@ -39,8 +44,14 @@ NUMBERS = {
     RESONANCE: (7.0, 0.04),
     RELAXATION: (0.12,),
     HYSTERESIS: (0.02, 0.7, 1.5),
+    STIFFENING: (0.2, -1.4, 1.2),
 }
-STRENGTHS = {RESONANCE: (900.0, 4.0), RELAXATION: (-9.0,), HYSTERESIS: (-12.0,)}
+STRENGTHS = {
+    RESONANCE: (900.0, 4.0),
+    RELAXATION: (-9.0,),
+    HYSTERESIS: (-12.0,),
+    STIFFENING: (-12.0,),
+}
 KINDS = pytest.mark.parametrize("kind", list(NUMBERS), ids=lambda kind: kind.name)
 
 
@@ -179,7 +190,7 @@ SYSTEMS = {
     ),
     "hysteresis": (
         truth.hysteresis(12.0, 0.012),
-        Hysteresis(limit=0.012, sharing=0.5, power=1.0, by_state=-12.0),
+        Hysteresis(limit=0.012, beta=0.5, power=1.0, by_state=-12.0),
         [0.0],
     ),
 }
@@ -227,7 +238,11 @@ def test_formulas_say_what_the_elements_are():
     assert hidden_formula(resonator) == (
         "z'' + 2*0.02*87.965*z' + 87.965**2*z = position; 12.3*z - 0.4*z'"
     )
-    hysteresis = Hysteresis(limit=0.012, sharing=0.5, power=1.0, by_state=-12.0)
+
+
+@pytest.mark.parametrize("beta, loading", [(0.5, 1), (0.7, 1), (-1.4, -1)])
+def test_the_formula_of_a_hysteresis_is_its_equation(beta, loading):
+    hysteresis = Hysteresis(0.012, beta, 1.0, by_state=-12.0, loading=loading)
     state, force = hidden_formula(hysteresis).split("; ")
     assert force == "-12*z"
     # the equation of the state, as it is written
@@ -236,3 +251,28 @@ def test_formulas_say_what_the_elements_are():
         written = eval(state.removeprefix("z' = "), names)
         rate = hysteresis.rate(0.0, jnp.asarray(velocity), jnp.asarray([z]))
         assert written == pytest.approx(float(rate[0]))
+
+
+def test_both_loops_dissipate():
+    """Work in a closed cycle of deflection, from the areas of the loops."""
+    path = 0.03 * np.sin(np.linspace(0, 4 * np.pi, 2001))
+    driven = Driven(path[None], np.zeros(1), np.full(1, 1e-3), 0.0, 0.03, "m")
+    for kind, numbers in (
+        (HYSTERESIS, (0.02, 0.7, 1.0)),
+        (STIFFENING, (0.1, -1.4, 1.0)),
+    ):
+        ((state, _),) = kind.signals(driven, [numbers])
+        z = state[0, 1000:, 0]
+        assert np.trapezoid(z, path[1000:]) > 0.05 * np.ptp(z) * np.ptp(path)
+
+
+def test_an_element_written_in_the_form_of_bouc_and_wen():
+    """z' = v - (gamma |v| z |z|^(n-1) + delta v |z|^n), of either sign."""
+    gamma, delta, n = 0.8, -1.1, 1.0
+    # beta + gamma of the element is c / limit^n
+    limit, beta = (-(gamma + delta)) ** (-1 / n), gamma / (gamma + delta)
+    element = Hysteresis(limit, beta, n, loading=-1)
+    for v, z in ((0.4, 1.3), (-0.4, 1.3), (0.4, -0.7), (-0.4, -0.7)):
+        expected = v - gamma * abs(v) * z - delta * v * abs(z)
+        found = element.rate(0.0, jnp.asarray(v), jnp.asarray([z]))
+        assert float(found[0]) == pytest.approx(expected, rel=1e-12)

@@ -24,8 +24,8 @@ def hidden_table(found: Fit, hidden: Hidden, points: int):
 
     For a resonance, this is the magnitude of the force for a unit deflection against
     frequency (Hz). For a relaxation, it is the force against the time (s) after a unit
-    deflection. For a hysteresis, it is the force against the distance from a reversal,
-    starting from full slip.
+    deflection. For a hysteresis, it is the force against the distance from a reversal
+    at the hidden state `-limit` (full slip, unless the element stiffens).
 
     **Returns:** the argument, values and errors, each `(points,)`, and the element.
     """
@@ -93,10 +93,12 @@ def hidden_formula(element: HiddenElement) -> str:
         state = f"z' = velocity - z/{_n(e.time)}"
     else:
         assert isinstance(e, Hysteresis)
-        d, n = float(e.sharing), _n(e.power)
+        # from the rounded number, so that both add up to one
+        b = f"{float(e.beta):.4g}"
+        sign = "-" if e.loading > 0 else "+"
         state = (
-            f"z' = velocity*(1 - ({_n(d)}*sign(velocity*z) + {_n(1 - d)})"
-            f"*abs(z/{_n(e.limit)})**{n})"
+            f"z' = velocity*(1 {sign} ({b}*sign(velocity*z) + {_n(1 - float(b))})"
+            f"*abs(z/{_n(e.limit)})**{_n(e.power)})"
         )
     away = f"*(position - {_n(e.middle)})"
     force = _sum(force, (e.stiffness, away), (e.damping, "*velocity"), (e.constant, ""))
@@ -132,6 +134,13 @@ def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) 
         return (
             f"a force with memory: it resists a deflection and relaxes over {said} s, "
             "like rubber, or a spring and a dashpot in series"
+        )
+    assert isinstance(element, Hysteresis)
+    if element.loading < 0:
+        return (
+            "a force with memory: its stiffness increases with the force, and more "
+            f"during unloading than during loading (hysteresis, over about "
+            f"{quantity(said, unit)})"
         )
     return (
         "a force with memory: from each reversal it is elastic over about "

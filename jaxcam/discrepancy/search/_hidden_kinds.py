@@ -1,6 +1,7 @@
 """Kinds of hidden elements, with their fitted parameters and their signals."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Sequence
 
@@ -56,14 +57,14 @@ class Number:
 class Kind:
     """A kind of element.
 
-    - `name`: its name in sentences; `numbers`: its parameters; `outputs`: names of its
-      strengths.
+    - `name`: its name in sentences; `element`: makes one from its parameters;
+      `numbers`: its parameters; `outputs`: names of its strengths.
     - `signals(driven, cells)`: returns, for each set of parameters, the outputs `(r, n,
       o)` and free motions `(r, n, s)`.
     """
 
     name: str
-    element: type[HiddenElement]
+    element: Callable[..., HiddenElement]
     numbers: tuple[Number, ...]
     outputs: tuple[str, ...]
     starts: int
@@ -88,8 +89,8 @@ def _relaxations(driven: Driven, cells):
     return [relaxation_signals(driven, *cell) for cell in cells]
 
 
-def _hystereses(driven: Driven, cells):
-    return list(zip(*hysteresis_signals(driven, *np.array(cells).T)))
+def _hystereses(driven: Driven, cells, loading: int = 1):
+    return list(zip(*hysteresis_signals(driven, *np.array(cells).T, loading)))
 
 
 RESONANCE = Kind(
@@ -116,11 +117,23 @@ HYSTERESIS = Kind(
     Hysteresis,
     (
         Number("limit", 0.0, math.inf, 0.4),
-        Number("sharing", 0.5, 1.5, 0.2, logarithm=False),
+        Number("beta", 0.5, 1.5, 0.2, logarithm=False),
         Number("power", 0.5, 6.0, 0.4),
     ),
     ("by_state",),
     1,
     _hystereses,
 )
-KINDS = (RESONANCE, RELAXATION, HYSTERESIS)
+STIFFENING = Kind(
+    "stiffening hysteresis",
+    functools.partial(Hysteresis, loading=-1),
+    (
+        Number("limit", 0.0, math.inf, 0.4),
+        Number("beta", -6.0, 0.0, 0.5, logarithm=False),
+        Number("power", 0.5, 3.0, 0.4),
+    ),
+    ("by_state",),
+    1,
+    functools.partial(_hystereses, loading=-1),
+)
+KINDS = (RESONANCE, RELAXATION, HYSTERESIS, STIFFENING)

@@ -17,7 +17,7 @@ from ...fitting import Problem
 from ...fitting.engine import invert_information
 from ..policy import Policy
 from ..terms import ByMotion, DIRECT
-from ._hidden_kinds import HYSTERESIS, Kind, RELAXATION, RESONANCE
+from ._hidden_kinds import HYSTERESIS, Kind, RELAXATION, RESONANCE, STIFFENING
 from ._hidden_signals import at_times, Driven
 from ._hidden_state import Hidden
 from ._local_force import forces_at_nodes, Response
@@ -33,6 +33,9 @@ _TIMES = 1.25
 # Limits of a hysteresis, as shares of the range of positions, and its other parameters
 _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
+# The same for a stiffening hysteresis
+_STIFFENING_LIMITS = tuple(np.geomspace(0.1, 10, 12).tolist())
+_STIFFENING_SHAPES = ((-0.3, 1.0), (-2.0, 1.0), (-0.3, 2.0), (-2.0, 2.0))
 # Number of force values at nodes that are computed at once
 _AT_ONCE = 8_000_000
 # Relative increase of a diagonal that keeps a matrix positive definite
@@ -101,10 +104,12 @@ def _grids(problem: Problem, driven: Driven, policy: Policy):
         shortest = 1 / (2 * math.pi * high)
         count = max(2, math.ceil(math.log(longest / shortest) / math.log(_TIMES)))
         yield RELAXATION, [(t,) for t in np.geomspace(shortest, longest, count)]
-    yield (
-        HYSTERESIS,
-        [(x * driven.spread, *shape) for x in _LIMITS for shape in _SHAPES],
-    )
+    for kind, limits, shapes in (
+        (HYSTERESIS, _LIMITS, _SHAPES),
+        (STIFFENING, _STIFFENING_LIMITS, _STIFFENING_SHAPES),
+    ):
+        cells = [(x * driven.spread, *shape) for x in limits for shape in shapes]
+        yield kind, cells
 
 
 class _Chain:

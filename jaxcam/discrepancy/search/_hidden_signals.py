@@ -129,10 +129,13 @@ def _first_order(position, pole: complex, interval: float):
 
 # Initial state of a hysteresis, used to compute the effect of a change in it
 _BESIDE = 1e-3
+# Largest state of a stiffening hysteresis, in units of its scale: it may grow without
+# bound in a finite deflection
+_MOST = 30.0
 
 
 def hysteresis_signals(
-    driven: Driven, limits: Any, sharings: Any, powers: Any
+    driven: Driven, limits: Any, betas: Any, powers: Any, loading: int = 1
 ) -> tuple[Float[np.ndarray, "k r n 1"], Float[np.ndarray, "k r n 1"]]:
     """Compute the hysteresis of Bouc and Wen for several `(k,)` sets of parameters at
     once.
@@ -140,15 +143,16 @@ def hysteresis_signals(
     **Returns:** its state, starting from zero, and the derivative with respect to the
     initial state.
     """
-    limits, sharings, powers = (
-        np.asarray(x, dtype=float)[:, None] for x in (limits, sharings, powers)
+    limits, betas, powers = (
+        np.asarray(x, dtype=float)[:, None] for x in (limits, betas, powers)
     )
+    most = limits if loading > 0 else _MOST * limits
     steps = np.diff(driven.position, axis=1)
 
     def slope(z, sign):
         size = np.maximum(np.abs(z) / limits, 1e-12)
-        turned = np.sign(z) * sign
-        return 1 - (sharings * turned + 1 - sharings) * size**powers
+        turned = betas * np.sign(z) * sign + 1 - betas
+        return 1 - loading * turned * size**powers
 
     def run(start):
         z = np.broadcast_to(start, (len(limits), len(steps))).astype(float)
@@ -159,7 +163,7 @@ def hysteresis_signals(
             sign = np.sign(step)
             middle = z + step / 2 * slope(z, sign)
             z = z + step * slope(middle, sign)
-            z = np.clip(z, -limits, limits)
+            z = np.clip(z, -most, most)
             found[k + 1] = z
         return np.moveaxis(found, 0, -1)[..., None]
 

@@ -162,18 +162,24 @@ class Relaxation(HiddenElement):
 
 
 class Hysteresis(HiddenElement):
-    """Bouc-Wen hysteresis, `z' = v (1 - (d sign(v z) + 1 - d) |z / limit|^n)`.
+    """Bouc-Wen hysteresis, `z' = v (1 - c (b sign(v z) + 1 - b) |z / limit|^n)`.
 
-    The force is `by_state * z`; `sharing` is d, `power` n.
+    The force is `by_state * z`; b is `beta`, n is `power`, c is `loading`. Its
+    stiffness changes by `-c` times the last factor during loading, and by
+    `-c (1 - 2 b)` times that during unloading (Wen 1976, with beta + gamma = c).
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
     """Names of the components of the hidden state."""
 
     limit: FloatScalar = _field(1.0)
-    """Largest hidden state, in the unit of the coordinate."""
-    sharing: FloatScalar = _field(0.5)
-    """Share d of the loading term; the rest is the share of the unloading term."""
+    """Scale of the hidden state, in the unit of the coordinate; its largest value if
+    `loading` is 1.
+    """
+    beta: FloatScalar = _field(0.5)
+    """Part b that changes its sign at a reversal. Energy is dissipated if `b * loading`
+    is positive.
+    """
     power: FloatScalar = _field(1.0)
     """Sharpness n of the transition."""
     by_state: FloatScalar = _field()
@@ -186,6 +192,8 @@ class Hysteresis(HiddenElement):
     """Acceleration per unit of velocity (1/s)."""
     middle: FloatScalar = _field()
     """Position from which the deflection is measured."""
+    loading: int = eqx.field(default=1, static=True)
+    """1 if the stiffness decreases during loading (slip), -1 if it increases."""
 
     def units(self, unit):
         return (unit,)
@@ -200,8 +208,8 @@ class Hysteresis(HiddenElement):
     def slope(self, direction, hidden):
         """Return `dz / dq` for motion in a given direction."""
         size = jnp.maximum(jnp.abs(hidden) / self.limit, 1e-12)
-        turned = jnp.sign(direction * hidden)
-        return 1 - (self.sharing * turned + 1 - self.sharing) * size**self.power
+        turned = self.beta * jnp.sign(direction * hidden) + 1 - self.beta
+        return 1 - self.loading * turned * size**self.power
 
     def push(self, hidden):
         return self.by_state * hidden[0]
