@@ -227,6 +227,8 @@ def test_a_saved_system_with_a_hidden_state_is_the_same(tmp_path):
 def test_a_number_without_meaning_is_refused():
     with pytest.raises(ValueError, match="Relaxation"):
         Relaxation(time=-0.1, by_state=1.0).check()
+    with pytest.raises(ValueError, match="loading is 1 or -1"):
+        Hysteresis(loading=0)
 
 
 def test_formulas_say_what_the_elements_are():

@@ -195,6 +195,10 @@ class Hysteresis(HiddenElement):
     loading: int = eqx.field(default=1, static=True)
     """1 if the stiffness decreases during loading (slip), -1 if it increases."""
 
+    def __check_init__(self):
+        if self.loading not in (1, -1):
+            raise ValueError(f"loading is 1 or -1, not {self.loading}.")
+
     def units(self, unit):
         return (unit,)
 
