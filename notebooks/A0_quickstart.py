@@ -88,7 +88,7 @@ for k in range(2):
     print(f"stop {k + 1}: {hits} impacts listed, in contact {share:.1%} of the time")
 
 turn = trajectory.stroboscopic()
-print("change of the state over the last turn:", abs(turn[-1] - turn[-2]).max())
+print("change of the state over the last period:", abs(turn[-1] - turn[-2]).max())
 # -
 
 # Neither mass ever penetrates its stop, not even between the steps of the integration:

@@ -63,8 +63,8 @@ from jaxcam.recordings import read_case, Recording, References, segment
 folder = Path(os.environ.get("JAXCAM_RECORDINGS", ".")) / "real"
 if not folder.is_dir():
     print(
-        "Skipped: get the sets from where this notebook says, and name the folder that "
-        "holds `real` in JAXCAM_RECORDINGS."
+                "Skipped: download the data sets listed in this notebook, and set "
+        "JAXCAM_RECORDINGS to the folder that contains `real`."
     )
     sys.exit()
 
@@ -109,20 +109,20 @@ def ask(case: str, system, runs, **options) -> None:
     print(f"{case}: {result.verdict}. {result.summary}")
     for name, one in result.rig.items():
         print(f"    {name} = {one.value:.5g} +- {one.stderr:.2g}")
-    print(f"    rather than {result.alternatives[:3]}")
+        print(f"    alternatives: {result.alternatives[:3]}")
     for effect in result.effects:
         print(
             f"    {effect.name}: BIC {effect.delta_bic:.0f}, inclusion "
-            f"{effect.inclusion:.2f}, seen in {', '.join(effect.records) or 'none'}"
+                        f"{effect.inclusion:.2f}, shown by {', '.join(effect.records) or 'none'}"
         )
     print(
-        f"    unseen halves {result.heldout_before:.3g} -> {result.heldout_after:.3g}, "
-        f"last record {moved[case][0]:.3g} -> {moved[case][1]:.3g}, "
+                f"    held-out rms {result.heldout_before:.3g} -> {result.heldout_after:.3g}, "
+        f"last recording {moved[case][0]:.3g} -> {moved[case][1]:.3g}, "
         f"noise {result.noise_floor:.3g}"
     )
     left = [one for one in result.left_after if one.significant][:2]
     for one in left:
-        print(f"    left over: {one.sentence}, {one.place}")
+                print(f"    still unexplained: {one.sentence}, {one.place}")
     print(
         f"    {time.time() - began:.0f} s, {time.process_time() - used:.0f} s of CPU",
         flush=True,
@@ -373,7 +373,7 @@ for row, result in enumerate(found.values()):
 axes.axvline(1.0, color="0.5", linewidth=0.8)
 axes.set_yticks(range(len(found)), list(found))
 axes.set_xscale("log")
-axes.set_xlabel("residual on unseen data (times the noise)")
+axes.set_xlabel("residual on held-out data (times the noise)")
 axes.invert_yaxis()
 if __name__ == "__main__":
     plt.show()

@@ -7,8 +7,7 @@
 # ---
 
 # # B0. Simulate and differentiate
-#
-# Derivatives of a trajectory pass through all of its events: an impact, the infinitely
+# A trajectory can be differentiated through all of its events: an impact, the infinitely
 # many impacts of complete chatter, the sticking that follows, and the release. This
 # notebook covers these in turn, compares each derivative with a formula or a finite
 # difference, and ends with a batch.
@@ -40,8 +39,8 @@ from jaxcam.plotting import style, time_history
 #   t_\infty = t_1 \frac{1 + r}{1 - r}.$$
 #
 # Of the infinitely many impacts about sixty are simulated, and the others are summed in
-# closed form. The derivative of the time at which the ball comes to rest passes through
-# all of them.
+# closed form. The derivative of the time at which the ball comes to rest includes all
+# of them.
 
 # +
 start, when = jnp.array([1.0, 0.0]), 0.7
@@ -129,8 +128,8 @@ step = 1e-4
 difference = (
     one_turn(before, rig.stiffness + step) - one_turn(before, rig.stiffness - step)
 ) / (2 * step)
-print("by the state a turn ago:", by_state.tolist())
-print("by the stiffness:       ", by_stiffness, " difference:", difference)
+print("d state / d state one revolution earlier:", by_state.tolist())
+print("d state / d stiffness:", by_stiffness, " finite difference:", difference)
 assert abs(by_state).max() < 1e-12 and abs(by_stiffness).min() > 1e-5
 assert jnp.allclose(by_stiffness, difference, rtol=1e-4)
 # -
@@ -186,6 +185,6 @@ with style():
 same = (impacts[2:] == impacts[1:-1]) & (impacts[1:-1] == impacts[:-2])
 quotient = (velocity[2:] - velocity[:-2]) / np.asarray(drops[2:] - drops[:-2])
 error = np.abs(quotient - slope[1:-1])[same]
-print(f"{same.sum()} places, largest difference {error.max():.4f} 1/s")
+print(f"{same.sum()} points, largest difference {error.max():.4f} 1/s")
 assert same.sum() > 250 and error.max() < 0.2
 plt.show()

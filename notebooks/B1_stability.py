@@ -59,7 +59,7 @@ np.testing.assert_allclose(
 
 product = variational.monodromy(system, orbit, method="product")
 differentiated = variational.monodromy(system, orbit, method="flow")
-print("largest difference of the two:", abs(product - differentiated).max())
+print("largest difference between the two:", abs(product - differentiated).max())
 assert jnp.allclose(product, differentiated, atol=1e-8)
 
 # ## Along a branch

@@ -48,7 +48,7 @@ figure = branch_diagram(
     family,
     x_scale=float(rad_s_to_rpm(1.0)),
     x_label=("speed", "rpm"),
-    y_label=("follower angle once a turn", "rad"),
+        y_label=("follower angle once per revolution", "rad"),
 )
 # -
 
@@ -58,10 +58,10 @@ figure = branch_diagram(
 for point in family.special:
     by = continuation.sensitivity(point, speed)
     print(f"{point.kind} at {rad_s_to_rpm(point.parameter):.3f} rpm moves by")
-    print(f"  {float(rad_s_to_rpm(by.stiffness)):8.3f} rpm a N/m of the spring")
+    print(f"  {float(rad_s_to_rpm(by.stiffness)):8.3f} rpm per N/m of spring stiffness")
     print(
-        f"  {float(rad_s_to_rpm(by.profile.eccentricity)) / 1e3:8.3f} rpm a mm "
-        "of the cam's eccentricity"
+        f"  {float(rad_s_to_rpm(by.profile.eccentricity)) / 1e3:8.3f}  rpm per mm "
+        "of cam eccentricity"
     )
 # -
 

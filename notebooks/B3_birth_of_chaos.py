@@ -55,7 +55,7 @@ rig = preset("calibrated")
 
 bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
 critical = continuation.chatter_interruption(rig, speed, bracket)
-print(f"complete chattering ends at {rad_s_to_rpm(critical):.5f} rpm")
+print(f"complete chatter ends at {rad_s_to_rpm(critical):.5f} rpm")
 
 # The figure shows the gap near the release at speeds slightly below and slightly above
 # the interruption. The gaps shrink so fast that their cube root is drawn.
@@ -129,7 +129,7 @@ drawn = beta_lobes(r, right, measured=(deviation[few].ravel(), simulated[few].ra
 
 depth = np.max(np.abs(simulated), axis=1)
 exponent = np.polyfit(np.log(deviation[2:, 0]), np.log(depth[2:]), 1)[0]
-print(f"kappa = {law.kappa:.4f} in theory, {exponent:.4f} in the motion")
+print(f"kappa = {law.kappa:.4f} in theory, {exponent:.4f} in the simulation")
 assert abs(exponent / float(law.kappa) - 1) < 0.02
 drawn = lobe_scaling(deviation[:, 0], depth, float(law.kappa))
 
@@ -159,7 +159,7 @@ inside = np.geomspace(1e-6, 1e-3, 900)
 points = np.concatenate([[-1e-3, 0.0], inside])
 images = np.asarray(turn(points)[:, 0] - start[0])
 rate = composed.incidence * composed.vector[0] / composed.feedback
-print(f"the map moves by {rate * rpm_to_rad_s(1.0):.6f} rad / rpm")
+print(f"the map shifts by {rate * rpm_to_rad_s(1.0):.6f} rad / rpm")
 
 
 def moved_map(deviation, shift):
@@ -190,10 +190,10 @@ with style():
     deviation = micro * (motion.states[:, :, 0] - float(start[0]))
     right.plot(np.repeat(rpm, 40), deviation.ravel(), ",", color="C1")
     right.plot(np.repeat(rpm, 40), micro * iterated[160:].T.ravel(), ",", color="C0")
-    right.plot([], [], "C1.", label="motion")
+        right.plot([], [], "C1.", label="simulation")
     right.plot([], [], "C0.", label="map")
     right.legend(loc="upper left")
-    left.set(xlabel="deviation (µrad)", ylabel="one turn later (µrad)")
+    left.set(xlabel="deviation (µrad)", ylabel="one revolution later (µrad)")
     right.set(xlabel="speed beyond the interruption (rpm)", ylabel="deviation (µrad)")
 
 widths = np.ptp(motion.states[:, :, 0], axis=1)

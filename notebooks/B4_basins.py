@@ -7,9 +7,9 @@
 # ---
 
 # # B4. Two coexisting attractors and their basins
-#
-# From one initial state, an oscillator settles to an orbit with one impact per period;
-# from another initial state nearby, to an orbit with six impacts in six periods. Which
+# From one initial state, an oscillator settles to an orbit with one impact per period.
+# From another initial state nearby, it settles to an orbit with six impacts in six
+# periods. Which
 # initial states lead to which orbit? And how well can this be predicted if the basin
 # boundary is as finely folded as here?
 
@@ -58,7 +58,7 @@ for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
     orbit = continuation.periodic_orbit(system, points[0], periods=turns)
     size = abs(orbit.multipliers).max()
     turns_to_settle = -turns / np.log(size)
-    print(f"{name}: |mu| = {size:.6f}, {turns_to_settle:.0f} turns for a factor e")
+    print(f"{name}: |mu| = {size:.6f}, {turns_to_settle:.0f} periods for a factor e")
     assert size < 1
     run = jaxcam.simulate(system, orbit.state, orbit.time, orbit.time + orbit.period)
     phase_portrait(run, ax)
@@ -76,6 +76,6 @@ for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
 uncertain = sweeps.uncertainty_exponent(found.attractor)
 print(f"exponent {uncertain.exponent:.2f} +- {uncertain.stderr:.2f}")
 print(f"dimension of the boundary {uncertain.dimension:.2f}")
-print(f"twice as exact: {2**-uncertain.exponent:.0%} of the uncertain states are left")
+print(f"error halved: {2**-uncertain.exponent:.0%} of the uncertain states remain")
 assert 0 < uncertain.exponent < 1 < uncertain.dimension < 2
 plt.show()

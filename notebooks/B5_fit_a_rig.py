@@ -72,7 +72,7 @@ model = fitting.Model(
 textbook = fitting.cam_follower_parameters(nominal, base=lambda s: s.rig)
 damping = fitting.Parameter("damping", lambda m: m.system.damping, lower=0.0)
 problem = fitting.Problem.build(model, segments, [*textbook, damping])
-print(f"{problem.samples} samples of {len(problem.records)} records")
+print(f"{problem.samples} samples in {len(problem.records)} recordings")
 # -
 
 # ## The textbook rig
@@ -95,7 +95,7 @@ def left(fit):
 
 found = fitting.fit(problem, free=names)
 again = fitting.bootstrap(found, 12)
-print("times the noise left before and after:", left(before), left(found))
+print("residual / noise, before and after the fit:", left(before), left(found))
 # -
 
 # The residual exceeds the noise in every recording, and in one it is four times the
@@ -108,7 +108,7 @@ print("times the noise left before and after:", left(before), left(found))
 
 # +
 whole = fitting.fit(problem, start=found)
-print("times the noise left:", left(whole))
+print("residual / noise:", left(whole))
 assert all(float(ratio) < 1.1 for ratio in left(whole))
 
 real = RealRig()

@@ -1,5 +1,6 @@
 """A block on a moving belt: dry friction holds the block until the spring force exceeds
-the friction, and motions from inside and outside converge to one stick-slip cycle."""
+the static friction, and trajectories that start inside or outside the stick-slip cycle
+converge to it."""
 
 import matplotlib.pyplot as plt
 import numpy as np
