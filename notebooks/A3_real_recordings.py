@@ -63,7 +63,7 @@ from jaxcam.recordings import read_case, Recording, References, segment
 folder = Path(os.environ.get("JAXCAM_RECORDINGS", ".")) / "real"
 if not folder.is_dir():
     print(
-                "Skipped: download the data sets listed in this notebook, and set "
+        "Skipped: download the data sets listed in this notebook, and set "
         "JAXCAM_RECORDINGS to the folder that contains `real`."
     )
     sys.exit()
@@ -113,16 +113,16 @@ def ask(case: str, system, runs, **options) -> None:
     for effect in result.effects:
         print(
             f"    {effect.name}: BIC {effect.delta_bic:.0f}, inclusion "
-                        f"{effect.inclusion:.2f}, shown by {', '.join(effect.records) or 'none'}"
+            f"{effect.inclusion:.2f}, shown by {', '.join(effect.records) or 'none'}"
         )
     print(
-                f"    held-out rms {result.heldout_before:.3g} -> {result.heldout_after:.3g}, "
+        f"    held-out rms {result.heldout_before:.3g} -> {result.heldout_after:.3g}, "
         f"last recording {moved[case][0]:.3g} -> {moved[case][1]:.3g}, "
         f"noise {result.noise_floor:.3g}"
     )
     left = [one for one in result.left_after if one.significant][:2]
     for one in left:
-                print(f"    still unexplained: {one.sentence}, {one.place}")
+        print(f"    still unexplained: {one.sentence}, {one.place}")
     print(
         f"    {time.time() - began:.0f} s, {time.process_time() - used:.0f} s of CPU",
         flush=True,

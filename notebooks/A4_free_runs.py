@@ -47,7 +47,7 @@ from jaxcam.plotting import style
 folder = Path(os.environ.get("JAXCAM_RECORDINGS", ".")) / "real"
 if not folder.is_dir():
     print(
-                "Skipped: download the data sets listed in notebook A3, and set "
+        "Skipped: download the data sets listed in notebook A3, and set "
         "JAXCAM_RECORDINGS to the folder that contains `real`."
     )
     sys.exit()
@@ -67,7 +67,7 @@ def stray(case, label, model, parameters, names, seen, unseen, scales, start=Non
     pair = fitted.runs[0].rmse[channel], other
     strayed.setdefault(case, {})[label] = pair
     values = ", ".join(f"{name} {value:.4g}" for name, value in fitted.values.items())
-        print(f"{case}, {label}: rms {pair[0]:.3g} fitted, {pair[1]:.3g} predicted; {values}")
+    print(f"{case}, {label}: rms {pair[0]:.3g}, predicted {pair[1]:.3g}; {values}")
     return fitted
 
 
@@ -108,8 +108,8 @@ estimation, pulses = read_stage(folder)
 steps = {
     "textbook": (),
     "dry friction": ("coulomb_friction",),
-        "additional damping backwards": ("damping_backwards",),
-        "friction that depends on position": ("uneven_friction",),
+    "additional damping backwards": ("damping_backwards",),
+    "friction that depends on position": ("uneven_friction",),
 }
 names: tuple[str, ...] = ()
 values = {"1/mass": 0.0105, "viscous": 2.0, "offset": -0.03, "fc": 0.2}
@@ -131,7 +131,7 @@ rate = np.gradient(estimation["position_m"], estimation.time)
 extra = pulses["motor_force_N"] - estimation["motor_force_N"]
 for name, there in {"forwards": rate > 0.02, "backwards": rate < -0.02}.items():
     usual = np.mean(np.abs(estimation["motor_force_N"][there]))
-        print(f"{name}: {np.mean(extra[there]):+.2f} N in addition to {usual:.1f} N")
+    print(f"{name}: {np.mean(extra[there]):+.2f} N in addition to {usual:.1f} N")
 early = (pulses.time > 0.1) & (pulses.time < 0.3)
 print(f"before the first pulse: {np.mean(extra[early]):+.2f} N")
 # -
@@ -157,7 +157,7 @@ for way, (seen, unseen) in {
         "textbook": (),
         "a surface": ("stop_above",),
         "and dry friction": ("stop_above", "coulomb_friction"),
-                "and the end of the stroke": ("stop_above", "coulomb_friction", "stop_below"),
+        "and a stop at the end": ("stop_above", "coulomb_friction", "stop_below"),
     }.items():
         stray(f"head, {way}", label, head, spring, names, seen, unseen, [run], touches)
 # -

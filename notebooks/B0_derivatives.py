@@ -7,10 +7,11 @@
 # ---
 
 # # B0. Simulate and differentiate
-# A trajectory can be differentiated through all of its events: an impact, the infinitely
-# many impacts of complete chatter, the sticking that follows, and the release. This
-# notebook covers these in turn, compares each derivative with a formula or a finite
-# difference, and ends with a batch.
+#
+# A trajectory can be differentiated through all of its events: an impact, the
+# infinitely many impacts of complete chatter, the sticking that follows, and the
+# release. This notebook covers these in turn, compares each derivative with a formula
+# or a finite difference, and ends with a batch.
 
 # +
 import equinox as eqx

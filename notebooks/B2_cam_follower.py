@@ -48,7 +48,7 @@ figure = branch_diagram(
     family,
     x_scale=float(rad_s_to_rpm(1.0)),
     x_label=("speed", "rpm"),
-        y_label=("follower angle once per revolution", "rad"),
+    y_label=("follower angle once per revolution", "rad"),
 )
 # -
 
@@ -60,7 +60,7 @@ for point in family.special:
     print(f"{point.kind} at {rad_s_to_rpm(point.parameter):.3f} rpm moves by")
     print(f"  {float(rad_s_to_rpm(by.stiffness)):8.3f} rpm per N/m of spring stiffness")
     print(
-        f"  {float(rad_s_to_rpm(by.profile.eccentricity)) / 1e3:8.3f}  rpm per mm "
+        f"  {float(rad_s_to_rpm(by.profile.eccentricity)) / 1e3:8.3f} rpm per mm "
         "of cam eccentricity"
     )
 # -

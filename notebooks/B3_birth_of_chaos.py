@@ -190,7 +190,7 @@ with style():
     deviation = micro * (motion.states[:, :, 0] - float(start[0]))
     right.plot(np.repeat(rpm, 40), deviation.ravel(), ",", color="C1")
     right.plot(np.repeat(rpm, 40), micro * iterated[160:].T.ravel(), ",", color="C0")
-        right.plot([], [], "C1.", label="simulation")
+    right.plot([], [], "C1.", label="simulation")
     right.plot([], [], "C0.", label="map")
     right.legend(loc="upper left")
     left.set(xlabel="deviation (µrad)", ylabel="one revolution later (µrad)")

@@ -7,6 +7,7 @@
 # ---
 
 # # B4. Two coexisting attractors and their basins
+#
 # From one initial state, an oscillator settles to an orbit with one impact per period.
 # From another initial state nearby, it settles to an orbit with six impacts in six
 # periods. Which

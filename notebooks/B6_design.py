@@ -205,7 +205,7 @@ intercept = design.restitution.intercept
 for _ in range(5):
     end, slope = jax.jvp(end_of_chattering, (intercept,), (jnp.ones(()),))
     r = design.restitution.slope * end + intercept
-    print(f"r = {r:.5f} : chatter is complete up to {rad_s_to_rpm(end):.6f} rpm")
+    print(f"r = {r:.5f}: chatter is complete up to {rad_s_to_rpm(end):.6f} rpm")
     if abs(end - goal) < 1e-9:
         break
     intercept = intercept + (goal - end) / slope

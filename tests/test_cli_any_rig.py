@@ -216,7 +216,7 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ("fit runs --rig cart.toml", "the column `position_m` is missing"),
         ("fit . --system cart.json --rig cart.toml", "name a Python file"),
         ("diagnose runs --rig cart.toml", "the column `position_m` is missing"),
-        ("diagnose one --rig cart.toml --next", "--next proposes drive speeds"),
+        ("diagnose one --rig cart.toml --next", "--next recommends a drive speed"),
         (
             "diagnose one --rig cart.toml",
             "There is only 1 recording; give at least two",

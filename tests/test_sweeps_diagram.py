@@ -133,7 +133,7 @@ def test_random_starts_show_what_one_start_hides():
         ({"workers": 0}, "workers is 0"),
         ({"dwell": (60, 10)}, "choose the direction up"),
         ({"dwell": (60, 2), "direction": "up"}, "record longer"),
-        ({"dwell": (-1, 10), "direction": "up"}, "seconds to wait and to record"),
+        ({"dwell": (-1, 10), "direction": "up"}, "settling time and the recording"),
         (
             {"system": ImpactSection(OSCILLATOR), "dwell": (6, 9), "direction": "up"},
             "once per period",

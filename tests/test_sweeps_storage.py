@@ -190,7 +190,7 @@ def test_killed_in_the_middle(tmp_path, whole):
 
 
 def test_another_sweep_is_not_mixed_in(stored):
-    with pytest.raises(ValueError, match="holds a sweep already; pass resume=True"):
+    with pytest.raises(ValueError, match="already contains a sweep; pass resume=True"):
         basins(SQUARE_ROOT, GRID, out=stored, **OPTIONS)
     with pytest.raises(ValueError, match=r"another sweep \(other turns\)"):
         basins(SQUARE_ROOT, GRID, 41, block=3, out=stored, resume=True)
@@ -200,7 +200,7 @@ def test_another_sweep_is_not_mixed_in(stored):
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path):
     (tmp_path / "letter.txt").write_text("dear reader")
-    with pytest.raises(ValueError, match="holds something else"):
+    with pytest.raises(ValueError, match="contains something else"):
         basins(SQUARE_ROOT, GRID, out=tmp_path, **OPTIONS)
     assert (tmp_path / "letter.txt").read_text() == "dear reader"
 

@@ -105,8 +105,9 @@ def periodic_orbit(
         if orbit is None:
             raise ValueError(
                 f"no periodic orbit of period {length:g} s was found near the guess: "
-                f"{why}; Newton's method on the motion: {later}. Try a guess closer to "
-                "the orbit (for example from a simulation), or another period"
+                f"{why}; Newton's method on the map over one period: {later}. Try a "
+                "guess closer to the orbit (for example from a simulation), or another "
+                "period"
             )
     return orbit
 
@@ -168,7 +169,7 @@ def _settled(system, base, number: int, free: bool, t0):
     states = run.states[0, _TURNS:]
     if run.code[0] or not np.all(np.isfinite(states)):
         raise ValueError(
-            "the run that should converge to an orbit did not reach its end; give a "
+            "the simulation that should converge to an orbit stopped early; give a "
             "guess of the state"
         )
     when = float(t0) + (_TURNS + _LOOKED) * base
@@ -179,9 +180,9 @@ def _settled(system, base, number: int, free: bool, t0):
             return states[-1], n
     sought = f"up to {_LOOKED // 2}" if free else f"{number}"
     raise ValueError(
-        f"after {_TURNS} forcing periods, the motion has not converged to an orbit of "
-        f"{sought} of them: it is chaotic, converges slowly, or has another period. "
-        "Give a guess of the state, or other parameter values"
+        f"after {_TURNS} forcing periods, the motion has not converged to an orbit "
+        f"with a period of {sought} of them: it is chaotic, converges slowly, or has "
+        "another period. Give a guess of the state, or other parameter values"
     )
 
 

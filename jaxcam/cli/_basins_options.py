@@ -27,10 +27,11 @@ class Cells:
         str | None, typer.Option(metavar="A,B", help="Upper corner of the grid.")
     ] = None
     shape: Annotated[
-        str, typer.Option(metavar="K,L", help="Number of cells along each component.")
+        str,
+        typer.Option(metavar="K,L", help="Number of cells along each state component."),
     ] = "128,128"
     turns: Annotated[
-        int, typer.Option(metavar="N", help="Forcing periods per run.")
+        int, typer.Option(metavar="N", help="Forcing periods per simulation.")
     ] = 100
     keep: Annotated[
         int, typer.Option(metavar="N", help="Final periods that are compared.")
@@ -40,8 +41,8 @@ class Cells:
         typer.Option(
             metavar="N",
             help=(
-                "Number of times a non-periodic run is extended to twice the number "
-                "of periods."
+                "How often a simulation that is not yet periodic is extended to twice "
+                "its length."
             ),
         ),
     ] = 1

@@ -49,4 +49,6 @@ def check_size(options: str, *counts: int) -> None:
 
 def check_resume(resume: bool, out: Path | None) -> None:
     if resume and out is None:
-        raise ValueError("--resume needs the folder of the interrupted run: --out DIR.")
+        raise ValueError(
+            "--resume needs the folder of the interrupted command: --out DIR."
+        )

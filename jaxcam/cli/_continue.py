@@ -33,7 +33,7 @@ def continue_(
     resume: Resume = False,
 ) -> None:
     """
-    Continue a periodic orbit in a parameter and list its bifurcations.
+    Follow a branch of periodic orbits as a parameter changes; list its bifurcations.
 
     \b
     Examples:
@@ -109,7 +109,7 @@ def _refuse_interrupted(path: Path) -> None:
     """
 
     Raises:
-        ValueError: The folder holds an interrupted branch.
+        ValueError: The folder contains an interrupted branch.
     """
     import continuation
 
@@ -121,8 +121,8 @@ def _refuse_interrupted(path: Path) -> None:
             continue
         if points and points[-1].kind != "end":
             raise ValueError(
-                f"{file} holds an interrupted branch; add --resume to continue it, or "
-                "give another folder to --out."
+                f"{file} contains an interrupted branch; add --resume to continue it, "
+                "or give another folder with --out."
             )
 
 

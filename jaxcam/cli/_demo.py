@@ -12,7 +12,11 @@ from ._options import JsonFile
 def demo(
     case: Annotated[
         Path | None,
-        typer.Option(metavar="CASE", help="A folder of recordings, one CSV per run."),
+        typer.Option(
+            metavar="CASE",
+            help="A folder of cam-follower recordings, one CSV file each; default: the "
+            "simulated recordings in the package.",
+        ),
     ] = None,
     rig: Annotated[
         Path | None,
@@ -22,7 +26,8 @@ def demo(
         str,
         typer.Option(
             metavar="NAME",
-            help="Runs with missing samples: refuse (stop with an error) or split.",
+            help="Recordings with missing samples: refuse (stop with an error) or "
+            "split (divide at every gap).",
         ),
     ] = "refuse",
     out: Annotated[
@@ -38,11 +43,13 @@ def demo(
     ] = True,
     branches: Annotated[
         bool,
-        typer.Option(help=("Also continue two orbits of the cam-follower rig.")),
+        typer.Option(
+            help="Also follow two branches of periodic orbits of the cam-follower."
+        ),
     ] = True,
 ) -> None:
     """
-    Compare recordings with a model, diagnose the model, and continue two orbits.
+    Compare recordings with a model, diagnose it, and follow two branches of orbits.
 
     By default, the simulated recordings shipped with the package are used. The report
     with its figures is DIR/index.html, the data are in DIR/result.json, and the

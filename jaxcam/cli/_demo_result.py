@@ -114,7 +114,8 @@ def _next_steps(found) -> list[tuple[str, str]]:
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --turns 40 "
             f"--out ./jaxcam-{rpm:.1f}rpm",
-            "Motion at the speed of the first run, with the parameters of the thesis.",
+            "Motion at the speed of the first recording, with the parameters of the "
+            "thesis.",
         ),
         (
             f"jaxcam simulate cam-follower --speed {rpm:.1f} --set restitution.r=0.5",
@@ -142,8 +143,8 @@ def _next_steps(found) -> list[tuple[str, str]]:
         ),
         (
             "jaxcam diagnose CASE --rig cart.toml --out ./report",
-            "A recording of your own: CASE is a folder with one CSV file per run, "
-            "whose columns are time_s and the channels of cart.toml.",
+            "A recording of your own: CASE is a folder with one CSV file per "
+            "recording, whose columns are time_s and the channels of cart.toml.",
         ),
         (
             "jaxcam demo --case DIR --rig DIR/rig.toml",

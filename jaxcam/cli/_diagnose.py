@@ -70,8 +70,8 @@ def diagnose(
     runs, nominal = read(case, rig, files, system)
     if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
         raise ValueError(
-            "--next proposes drive speeds, and this rig has no rotating drive; leave "
-            "it out, and pass simulated recordings to "
+            "--next recommends a drive speed, but this rig has no rotating drive; "
+            "leave --next out, and pass simulated recordings to "
             "jaxcam.discrepancy.compare_experiments."
         )
     output = Output(json_file, out)
@@ -93,22 +93,22 @@ def diagnose(
 
 
 def _kept_fits(out: Path | None, resume: bool) -> Path | None:
-    """Return the folder that stores the fits of a stopped run.
+    """Return the folder that stores the fits of an interrupted diagnosis.
 
     Raises:
-        ValueError: There is nothing to resume, or the folder contains the fits of a
-            stopped run and `resume` is false.
+        ValueError: There is nothing to resume, or the folder contains the fits of an
+            interrupted diagnosis and `resume` is false.
     """
     keep = None if out is None else out / "fits"
     if resume and (keep is None or not keep.is_dir()):
         raise ValueError(
-            "--resume: there is nothing to resume; give the folder of a stopped run "
-            "as --out, or leave --resume out to start again."
+            "--resume: there is nothing to resume; give the folder of the interrupted "
+            "diagnosis with --out, or leave --resume out to start again."
         )
     if keep is not None and not resume and any(keep.glob("*.npz")):
         raise ValueError(
-            f"{keep} contains the fits of a stopped run; add --resume to continue it, "
-            "or give another folder as --out."
+            f"{keep} contains the fits of an interrupted diagnosis; add --resume to "
+            "continue it, or give another folder with --out."
         )
     return keep
 
@@ -129,7 +129,8 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
         )
         outlook = Outlook(predicted)
     if propose and any(one.element is not None for one in found.missing):
-        report("no recording is proposed, because a force with memory was found", None)
+        words = "no recording is recommended, because a force with memory was found"
+        report(words, None)
     elif propose:
         proposed = discrepancy.next_experiments(
             found, nominal, seed=seed, progress=report

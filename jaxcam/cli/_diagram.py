@@ -122,8 +122,8 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     low, high = sweep.bounds
     return (
         f"{system}: {total} samples, {axis.name} from {low:g} to {high:g}; "
-        f"{len(made.ranges())} ranges with the same attractor throughout"
-        + (f", {failed} runs failed or could not start." if failed else ".")
+        f"{len(made.ranges())} ranges, each with one type of attractor"
+        + (f"; {failed} simulations failed or could not start." if failed else ".")
     )
 
 

@@ -27,7 +27,9 @@ class Sweep:
     ] = "speed"
     low: Lowest = None
     high: Highest = None
-    points: Annotated[int, typer.Option(metavar="N", help="Number of values.")] = 200
+    points: Annotated[
+        int, typer.Option(metavar="N", help="Number of parameter values.")
+    ] = 200
     turns: Annotated[
         int, typer.Option(metavar="N", help="Forcing periods at each value.")
     ] = 300
@@ -39,8 +41,8 @@ class Sweep:
         typer.Option(
             metavar="NAME",
             help=(
-                "up, down or both: each value starts from the final state of the "
-                "previous one; each: every value starts from the same state."
+                "up, down or both: start each simulation from the final state at the "
+                "previous value; each: start all simulations from the same state."
             ),
         ),
     ] = "both"
@@ -48,8 +50,8 @@ class Sweep:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Seconds to wait and to record at each value, as in an experiment; "
-            "replaces --turns and --keep.",
+            help="Settling time and recording time (s) at each value, as in an "
+            "experiment; replaces --turns and --keep.",
         ),
     ] = None
     section: Annotated[
@@ -82,8 +84,8 @@ class Sweep:
         found = numbers("--dwell", self.dwell, "60,10")
         if len(found) != 2:
             raise ValueError(
-                f"--dwell is {self.dwell!r}; give the seconds to wait and to record, "
-                "such as 60,10."
+                f"--dwell is {self.dwell!r}; give the settling time and the recording "
+                "time in seconds, such as 60,10."
             )
         return found
 
@@ -94,7 +96,9 @@ class Starts:
 
     state: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Initial state; default: at rest in contact."),
+        typer.Option(
+            metavar="A,B", help="Initial state; default: in sustained contact."
+        ),
     ] = None
     starts: Annotated[
         int | None,

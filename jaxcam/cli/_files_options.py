@@ -19,9 +19,9 @@ class Files:
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Names of all columns in order, - to skip one "
-            "(time_s,-,angle_rad), or a new name for some columns, with a factor "
-            "(Angle=angle_deg,Y1=height_m*-8e-4).",
+            help="The names of all columns in order, with - for a column to skip "
+            "(time_s,-,angle_rad); or new names for some columns, optionally with a "
+            "factor (Angle=angle_deg,Y1=height_m*-8e-4).",
         ),
     ] = None
     rate: Annotated[
@@ -32,7 +32,7 @@ class Files:
     ] = None
     split: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="Column with the run number."),
+        typer.Option(metavar="COLUMN", help="Column that numbers the recordings."),
     ] = None
 
     def check(self) -> None:

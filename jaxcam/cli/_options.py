@@ -40,7 +40,7 @@ Assignments: TypeAlias = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="A parameter in SI units, such as restitution.r=0.6; repeatable.",
+        help="A parameter in SI units, such as restitution.r=0.6; can be repeated.",
     ),
 ]
 Speed: TypeAlias = Annotated[
@@ -78,15 +78,16 @@ JsonFile: TypeAlias = Annotated[
     ),
 ]
 Resume: TypeAlias = Annotated[
-    bool, typer.Option("--resume", help="Continue the stopped run in DIR.")
+    bool,
+    typer.Option("--resume", help="Resume the interrupted command with --out DIR."),
 ]
 Case: TypeAlias = Annotated[
     Path,
     typer.Argument(
         metavar="CASE",
         help=(
-            "A folder of recordings, or one file; or a shipped case: demo "
-            "(simulated) or pendulum (real)."
+            "A folder of recordings, or one file; or demo (simulated) or pendulum "
+            "(real), the recordings in the package."
         ),
         callback=_shipped,
     ),
@@ -107,7 +108,7 @@ Gaps: TypeAlias = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Faulty recordings: mend (dropped samples, encoder slips), refuse or "
-        "split.",
+        help="Recordings with missing samples or encoder slips: mend (repair, split at "
+        "long gaps), refuse, or split (at every gap).",
     ),
 ]

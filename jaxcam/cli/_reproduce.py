@@ -64,7 +64,9 @@ def reproduce(
     choose("--preset", preset, _PRESETS)
     choose("--size", size, _SIZES)
     if resume and out is None:
-        raise ValueError("--resume needs the folder of the stopped run: --out DIR.")
+        raise ValueError(
+            "--resume needs the folder of the interrupted command: --out DIR."
+        )
 
     from ..thesis import TARGETS
     from ._output import Output

@@ -46,8 +46,8 @@ class RunOptions:
         typer.Option(
             metavar="NAME",
             help=(
-                "loop, or diffeqsolve (one diffrax call per flight; also for implicit "
-                "solvers)."
+                "loop, or diffeqsolve (one diffrax call per flight; also supports "
+                "implicit solvers)."
             ),
         ),
     ] = None

@@ -28,7 +28,7 @@ EVENTS = (
     "valve float",
     "P(1,1) appears (fold)",
     "P(1,1) doubles its period (flip)",
-    "chattering is interrupted",
+    "chatter is interrupted",
 )
 """Names of the events, in the order of the speeds."""
 

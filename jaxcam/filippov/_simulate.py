@@ -14,12 +14,12 @@ from .modes import region
 
 
 _WHY = {
-    RUNNING: "The step budget ran out before t1: raise max_steps.",
+    RUNNING: "The maximum number of steps was reached before t1: raise max_steps.",
     2: (
-        "No step was short enough: a field or the surface is not smooth here, or the "
-        "tolerance is below rounding."
+        "No step was short enough: a vector field or the surface is not smooth here, "
+        "or the tolerance is below the rounding error."
     ),
-    NOT_FINITE: "A field returned NaN or infinity: check parameters and state.",
+    NOT_FINITE: "A vector field returned NaN or infinity: check parameters and state.",
 }
 
 
@@ -111,6 +111,6 @@ def _check(system, state, t0, t1):
     height = abs(float(system.switching(t0, state)))
     if height <= 1e-12 and region(system, t0, state) == "escaping":
         raise ValueError(
-            "Both fields point away from the surface at this start, so the motion is "
-            "not unique; start on one of the sides."
+            "Both vector fields point away from the surface at the initial state, so "
+            "the motion is not unique; start on one side of the surface."
         )

@@ -51,7 +51,9 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
     bad = exists & ~(np.isfinite(flown) & states)
     for p, name in enumerate(problem.names):
         if not np.all(np.isfinite(np.asarray(point.values)[:, p])):
-            return f"The parameter {name} is not a finite number; start elsewhere."
+            return (
+                f"The parameter {name} is not a finite number; start from other values."
+            )
     if np.any(bad):
         r, k = np.argwhere(bad)[0]
         when = float(np.asarray(pieces.flown.start)[r, k])
@@ -131,6 +133,6 @@ def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
             if np.any(np.abs(column - bound) <= near):
                 found.append(
                     f"{name} is at its {side} bound {bound:g}, where its error is "
-                    f"meaningless; widen the bound or hold the parameter."
+                    f"meaningless; widen the bound or fix the parameter."
                 )
     return found

@@ -98,7 +98,7 @@ def ellipse_of(
     part = np.asarray(covariance)[np.ix_(rows, rows)]
     if not np.all(np.isfinite(part) & (np.diag(part) > 0)[:, None]):
         raise ValueError(
-            f"One of {', '.join(names)} has no finite error; hold the parameters that "
+            f"One of {', '.join(names)} has no finite error; fix the parameters that "
             "the data do not determine."
         )
     return Ellipse(tuple(names), np.asarray(centre, dtype=float)[rows], part, level)

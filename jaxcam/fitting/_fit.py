@@ -231,7 +231,7 @@ def _descend(
             if damping > _MOST_DAMPING:
                 message = (
                     "No further step improves the fit, although it is not at an "
-                    "optimum; check the residuals, or start elsewhere."
+                    "optimum; check the residuals, or start from other values."
                 )
                 break
         so_far.append(cost)

@@ -74,7 +74,7 @@ class Identifiability:
         dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]
         if dead:
             found.append(
-                f"The data do not depend on {_listed(dead)} at all: hold "
+                f"The data do not depend on {_listed(dead)} at all: fix "
                 f"{'it' if len(dead) == 1 else 'them'}."
             )
         alone = [

@@ -45,12 +45,14 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     successful = ""
     """The run reached t1."""
     running = (
-        "The step budget ran out before t1: raise max_steps, or loosen the tolerance."
+        "The maximum number of steps was reached before t1: raise max_steps, or loosen "
+        "the tolerance."
     )
     """The maximum number of steps was reached."""
     step_failed = (
         "No step was short enough: the vector field or the gap is not smooth here, or "
-        "the tolerance is below rounding; loosen the tolerance, or check the functions."
+        "the tolerance is below the rounding error; loosen the tolerance, or check the "
+        "functions."
     )
     """The integration step became too small."""
     not_finite = (
@@ -73,7 +75,7 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     """Impacts on several constraints accumulate together."""
     accumulates = (
         "Crossings of a switching surface accumulate: each flight off the surface is "
-        "shorter than the last. Choose t1 before this time, or give the switch a "
+        "shorter than the last. Choose t1 before this time, or give the surface a "
         "hysteresis."
     )
     """Crossings of a switching surface accumulate."""

@@ -47,7 +47,7 @@ def diagram(
         values: Values of the parameter, shape `(points,)`.
         states: Initial states: `(n,)`; `(starts, n)` for several at each value;
             `(points, starts, n)` for different ones at each value, for example from
-            [`jaxcam.sweeps.monte_carlo`][]. Default: at rest in contact.
+            [`jaxcam.sweeps.monte_carlo`][]. Default: in sustained contact.
         turns: Number of periods simulated.
         keep: Number of final periods to keep.
         direction: With "each", every value starts from the same state; with "up",

@@ -23,7 +23,7 @@ def dwell_turns(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the number of periods at each value, and the number of recorded periods.
 
-    **Arguments:** `dwell`: seconds to wait and to record. The waiting time is rounded
+    **Arguments:** `dwell`: settling time and recording time (s). The settling time is rounded
     up to full periods, and only full periods are recorded.
 
     Raises:
@@ -34,7 +34,7 @@ def dwell_turns(
     wait, store = (float(seconds) for seconds in dwell)
     if not (0 <= wait < math.inf and 0 < store < math.inf):
         raise ValueError(
-            f"dwell is {dwell}; give the seconds to wait and to record, "
+            f"dwell is {dwell}; give the settling time and the recording time (s), "
             "such as (60, 10)"
         )
     length = np.broadcast_to(section.turn(where, values), np.shape(values))

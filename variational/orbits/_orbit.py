@@ -148,7 +148,7 @@ def orbit_of(
     t0, period = float(jnp.asarray(t0)), _length(system, period)
     turn = simulate(system, state, t0, t0 + period, settings=settings)
     if not bool(turn.successful):
-        raise ValueError(f"the run over one period did not end: {turn.result}")
+        raise ValueError(f"the simulation of one period stopped early: {turn.result}")
     system, impacts, contacts = turn.system, turn.impacts, turn.contacts
     sizes = component_sizes(system, t0, state, period)
     away = jnp.abs(turn.final - state)

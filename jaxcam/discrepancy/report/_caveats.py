@@ -69,8 +69,8 @@ def caveats_of(
         yield Caveat(
             Reason.NOT_SHARED,
             "A discrepancy that differs from recording to recording remains "
-            f"({apart[0].sentence}). It is not physics that the recordings share; "
-            "check how the recordings were made.",
+            f"({apart[0].sentence}). Its cause is not common to the recordings; check "
+            "how they were made.",
         )
     held = choice.held
     if held.after > trials.policy.as_noise:
@@ -150,7 +150,7 @@ def decoy_explains(share: float) -> Caveat:
         Reason.DECOY,
         "The same function evaluated along the time-reversed motion would explain "
         f"{share:.0%} of what it explains, so these recordings hardly show when "
-        "the force acts. Record motions that repeat less.",
+        "the force acts. Record less periodic motions.",
     )
 
 

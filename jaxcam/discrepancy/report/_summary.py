@@ -82,14 +82,14 @@ def summary_of_functions(
         factor, unit = scaled(unit, held.before * floor)
         before, after = (factor * floor * one for one in (held.before, held.after))
         return (
-            f"{found} Fitted together with the rig, it reduces the error on held-out "
-            f"flights from {before:.3g} to {quantity(f'{after:.3g}', unit)}; the "
-            f"noise is {factor * floor:.3g}."
+            f"{found} Fitted together with the rig parameters, it reduces the error on "
+            f"held-out flights from {before:.3g} to "
+            f"{quantity(f'{after:.3g}', unit)}; the noise is {factor * floor:.3g}."
         )
     return (
-        f"{found} Fitted together with the rig, it explains the recordings to within "
-        f"{left:.3g} times the noise; part of the data does not determine it well "
-        "enough to predict the rest."
+        f"{found} Fitted together with the rig parameters, it explains the recordings "
+        f"to within {left:.3g} times the noise; part of the data does not determine "
+        "it well enough to predict the rest."
     )
 
 
@@ -102,7 +102,7 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
         break
     if fitted > policy.as_noise:
         return (
-            "No physics that the recordings share is missing. However, they are not "
+            "No physics common to the recordings is missing. However, they are not "
             f"explained down to the sensor noise: the residual is {fitted:.2g} times "
             f"the noise and differs from recording to recording.{tail}"
         )

@@ -52,7 +52,7 @@ class Parameter:
         if not self.tolerance > 0:
             raise ValueError(
                 f"The parameter {self.name!r} has the tolerance {self.tolerance:g}; "
-                f"give a positive one, or omit the parameter to hold it."
+                f"give a positive one, or omit the parameter to keep it fixed."
             )
         if not self.lower < self.upper:
             raise ValueError(

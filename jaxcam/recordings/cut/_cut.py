@@ -202,7 +202,7 @@ def _impact(found: dict) -> Boundary:
     error = np.hypot(found["before_stderr"], found["after_stderr"])
     evidence = f"the velocity jumps by {jump:.3g}, {jump / error:.0f} standard errors"
     if jump < SIGNIFICANT * error:
-        evidence = "a cubic with a hinge describes both sides of a slow impact"
+        evidence = "a cubic with a kink describes both sides of a slow impact"
     return Boundary(found["time"], found["time_stderr"], "impact", evidence)
 
 

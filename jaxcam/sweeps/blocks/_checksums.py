@@ -124,7 +124,9 @@ def _check_together(path, dataset: xarray.Dataset) -> None:
         found = {}
     bad = [name for name in wanted if found.get(name) != wanted[name]]
     if bad:
-        raise ValueError(f"{about} to mend {', '.join(bad)}, which cannot be trusted")
+        raise ValueError(
+            f"{about} to recompute {', '.join(bad)}, whose checksums do not match"
+        )
 
 
 def checksums(dataset: xarray.Dataset, names) -> dict[str, int]:

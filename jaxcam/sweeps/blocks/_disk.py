@@ -113,11 +113,13 @@ class OnDisk:
         """Continue with the data at the path, if it is the same sweep."""
         identity = stored_identity(self.path)
         if identity is None:
-            raise ValueError(f"{self.path} holds something else; choose another folder")
+            raise ValueError(
+                f"{self.path} contains something else; choose another folder"
+            )
         if not resume:
             raise ValueError(
-                f"{self.path} holds a sweep already; pass resume=True to continue it, "
-                "or choose another folder"
+                f"{self.path} already contains a sweep; pass resume=True to continue "
+                "it, or choose another folder"
             )
         wanted = plain(self.layout.identity)
         if identity != wanted:
@@ -127,8 +129,9 @@ class OnDisk:
                 if identity.get(key) != wanted.get(key)
             ]
             raise ValueError(
-                f"{self.path} holds another sweep (other {', '.join(differing)}); "
-                "choose another folder, or request the same sweep to continue it"
+                f"{self.path} contains a different sweep (other "
+                f"{', '.join(differing)}); choose another folder, or request the same "
+                "sweep to continue it"
             )
         self._check_description()
 

@@ -72,7 +72,7 @@ def state_in_contact(system: HybridSystem, t0, where=None, values=None) -> np.nd
     gap = jax.eval_shape(system.gap, jnp.asarray(t0, float), jnp.zeros(2))
     if (names and len(names) != 2) or gap.size != 1:
         raise ValueError(
-            "the default start, at rest in contact, exists for two states and one "
+            "the default start, in sustained contact, exists for two states and one "
             "constraint; pass the states to start from"
         )
     batched, shared = split_lanes(as_arrays(system), where, values)
