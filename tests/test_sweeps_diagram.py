@@ -67,7 +67,7 @@ def test_seconds_of_a_rig_in_whole_turns(tmp_path):
     then = own.sample(first.final, 62, 14)
     assert np.array_equal(made.states[1], then.states)
     assert made.labels[0, 0] == "P(1,1)"
-    with pytest.raises(ValueError, match="another sweep|something else"):
+    with pytest.raises(ValueError, match="different sweep|something else"):
         diagram(
             SECTION,
             "omega",

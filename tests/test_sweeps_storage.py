@@ -192,9 +192,9 @@ def test_killed_in_the_middle(tmp_path, whole):
 def test_another_sweep_is_not_mixed_in(stored):
     with pytest.raises(ValueError, match="already contains a sweep; pass resume=True"):
         basins(SQUARE_ROOT, GRID, out=stored, **OPTIONS)
-    with pytest.raises(ValueError, match=r"another sweep \(other turns\)"):
+    with pytest.raises(ValueError, match=r"different sweep \(other turns\)"):
         basins(SQUARE_ROOT, GRID, 41, block=3, out=stored, resume=True)
-    with pytest.raises(ValueError, match=r"another sweep \(other sweep, "):
+    with pytest.raises(ValueError, match=r"different sweep \(other sweep, "):
         diagram(LOGISTIC, "mu", [3.0], [0.3], out=stored, resume=True)
 
 

@@ -23,8 +23,8 @@ def dwell_turns(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the number of periods at each value, and the number of recorded periods.
 
-    **Arguments:** `dwell`: settling time and recording time (s). The settling time is rounded
-    up to full periods, and only full periods are recorded.
+    **Arguments:** `dwell`: settling time and recording time (s). The settling time is
+    rounded up to full periods, and only full periods are recorded.
 
     Raises:
         ValueError: Less than one full period would be recorded.
