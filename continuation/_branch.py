@@ -47,9 +47,10 @@ def branch(
         callbacks: Called with each point as it is found, for example to show progress
             or to save it. If a callback returns True, the branch ends.
         out: A file to which each point is appended, for [`continuation.load_branch`][];
-            the first of two directions goes to a file with `.back` before the suffix.
-        resume: Whether to continue the run that wrote `out` from where it was
-            interrupted. The result is identical to that of an uninterrupted run.
+            with `"both"`, the first direction is written to a file with `.back` before
+            the suffix.
+        resume: Whether to continue an interrupted call from the points in `out`. The
+            result is identical to that of an uninterrupted call.
 
     Returns:
         A [`continuation.Branch`][].

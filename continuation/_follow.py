@@ -30,10 +30,11 @@ def follow(
 ) -> Iterator[Point]:
     """Follow a branch of solutions and yield its points, including special points.
 
-    The branch ends on a bound; at an earlier point of its own; where doubled orbits
-    join those of half the period; at the zero of a monitor that ends the problem, if
-    there is no transition to another problem; if the smallest step fails; or after
-    `settings.max_points` points. The `reason` of the last point tells which.
+    The branch ends on a bound; when it returns to one of its earlier points; where
+    period-doubled orbits join those of half the period; at the zero of a monitor that
+    ends the problem, if there is no transition to another problem; if the smallest step
+    fails; or after `settings.max_points` points. The `reason` of the last point states
+    which of these applies.
 
     Args:
         problem: The problem, such as [`continuation.Equilibrium`][]; or a hybrid
@@ -41,7 +42,7 @@ def follow(
         start: A state `(n,)` at the parameter value of the problem, on the branch or
             close enough for Newton's method to converge; or a [`continuation.Start`][],
             such as that of a branch to switch to; or a [`continuation.Point`][], from
-            which the run continues exactly as the original one did.
+            which the branch continues exactly as it did originally.
         where: Selects the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
         algorithm: Default [`continuation.PseudoArclength`][].

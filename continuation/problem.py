@@ -64,11 +64,11 @@ class AbstractProblem(eqx.Module):
         unit circle do (fixed points and periodic orbits), `"none"` otherwise.
     - `residual(u, parameters)`.
 
-    The other methods have defaults. **Traced** (called inside compiled programs; jax
-    functions, differentiable forward): `residual`, `linearisation`, `derivatives`,
-    `local_dynamics`, `seen`, `watched`, `scale`. All their non-array data must be
-    static: one program is compiled for each problem structure and reused for all array
-    values in it. `residual` and monitors with `ends=False` must be smooth; where an
+    The other methods have defaults. **Traced** (called inside compiled programs; JAX
+    functions, differentiable in forward mode): `residual`, `linearisation`,
+    `derivatives`, `local_dynamics`, `seen`, `watched`, `scale`. All their non-array
+    data must be static, because one program is compiled for each problem structure and
+    reused for all array values in it. `residual` and monitors with `ends=False` must be smooth; where an
     orbit does not exist, return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,

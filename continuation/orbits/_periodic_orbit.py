@@ -53,10 +53,10 @@ def periodic_orbit(
 ) -> Orbit:
     """Find a periodic orbit near a guess, stable or not, with any number of impacts.
 
-    The impacts of the motion from the guess define the equations of multiple shooting;
-    if that fails, the motion sticks, or the system has switching surfaces, Newton's
-    method is applied to the motion over one period. Finally, the solution is simulated
-    with the event loop, which must return to it.
+    The impacts of the motion from the guess define the equations of multiple shooting.
+    If these cannot be solved, if the motion sticks, or if the system has switching
+    surfaces, Newton's method is applied to the map over one period instead. Finally,
+    the orbit is simulated; the simulation must return to the initial state.
 
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][], forced or not.
@@ -66,7 +66,7 @@ def periodic_orbit(
         periods: Period of the orbit in forcing periods, instead of `period`. The
             default is 1; without a guess, the number is detected.
         t0: Time of the guess (s).
-        settings: Accuracy of the runs; default a tolerance of 1e-12.
+        settings: Accuracy of the simulations; the default tolerance is 1e-12.
 
     Returns:
         A [`variational.Orbit`][] with `.state` at `.time` (`t0`, unless that is the

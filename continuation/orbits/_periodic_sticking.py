@@ -50,8 +50,8 @@ class StickingOrbits(AbstractProblem):
 
     - the margin of [`variational.chatter_accumulation`][], which is zero if the impacts
         accumulate exactly at the n-th release. There, the sticking time itself falls to
-        zero like a power and does not change sign (thesis, section 3.5.1), but the
-        margin is smooth.
+        zero as a power of the distance and does not change sign (thesis, section
+        3.5.1), but the margin is smooth.
     - the rate of change of the contact acceleration at release, relative to the forcing
         period. It is zero if release and the next return to contact coincide, which is
         the detachment point (valve float); beyond it, contact never ends.

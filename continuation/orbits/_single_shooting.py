@@ -25,11 +25,11 @@ class SingleShooting(AbstractProblem):
     """Periodic orbits whose events may change along a branch.
 
     The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or without
-    forcing the state and the period (s), shape `(n + 1,)`. The equation is that the
-    event loop returns to the state, and without forcing also that the state lies in a
-    plane perpendicular to the motion, which is updated at each point of a branch. One
-    program serves orbits with any numbers of impacts, crossings and sliding phases. The
-    Jacobian contains the saltation matrices of all events.
+    forcing the state and the period (s), shape `(n + 1,)`. The equations
+    require that a simulation return to the state and, without forcing, that the state
+    lie in a plane perpendicular to the motion, which is updated at each point of a
+    branch. One compiled program computes orbits with any number of impacts, crossings
+    and sliding phases. The Jacobian contains the saltation matrices of all events.
 
     Where an impact grazes, the Jacobian is unbounded on one side; follow orbits of
     systems without switching surfaces with [`continuation.ImpactingOrbits`][], which
@@ -65,7 +65,7 @@ class SingleShooting(AbstractProblem):
     periods: int = eqx.field(static=True)
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     turns: int = eqx.field(static=True, default=1)
-    """Number of turns of an orbit without forcing, 2 after a flip."""
+    """How many times an orbit without forcing is traversed: 2 after a flip."""
 
     @staticmethod
     def of(
@@ -161,8 +161,8 @@ class SingleShooting(AbstractProblem):
     def seen(self, u, parameters):
         """Return the observed quantities; there are no monitors.
 
-        They are the period (s), the time (s) and the state at which the period is
-        begun, the number of impacts and, with forcing, the states at whole forcing
+        They are the period (s), the time (s) and the state at the start of
+        the period, the number of impacts and, with forcing, the states at whole forcing
         periods after that time, `(periods, n)`.
 
         Args:

@@ -43,9 +43,9 @@ def diagnose(
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
-            `jaxcam.fitting.read_setup`, which include sensors and tolerances; or any
-            system with at least one coordinate, together with `sensors`, `parameters`
-            and `drive`.
+            `jaxcam.fitting.read_setup`, which include sensors and tolerances; or a
+            bare system: any system with at least one coordinate, together with
+            `sensors`, `parameters` and `drive`.
         recordings: At least two recordings of a rig; for a bare system, segments from
             `jaxcam.recordings.segment`.
         candidates: Terms that may be named; default `library()`, with the constants of
@@ -65,7 +65,7 @@ def diagnose(
 
     Raises:
         RecordingError: The recordings are insufficient; the message gives the reason.
-        ValueError: A term acts nowhere.
+        ValueError: A term overrides none of the methods through which it can act.
     """
     report = progress or (lambda sentence, fraction: None)
     make_room()

@@ -74,8 +74,8 @@ def fit(
         iterations: Maximum number of iterations.
         stop: Called after each iteration with all costs so far, including that of the
             start; if it returns True, the fit ends without convergence. Long flights
-            are first fitted to convergence with loose joints; only the costs of the
-            subsequent iterations are passed.
+            are first fitted to convergence with relaxed continuity conditions between
+            pieces; only the costs of the subsequent iterations are passed.
         progress: Called with the iteration number and the cost.
 
     Returns:
@@ -250,8 +250,8 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
     """Return the cost of held-out data for a fit.
 
     The parameters are not changed; the states of the pieces are fitted to the data,
-    because they cannot be predicted. Joints between held-out pieces are included. The
-    example continues that of [`jaxcam.fitting.fit`][].
+    because they cannot be predicted. Joints (continuity conditions) between held-out
+    pieces are included. The example continues that of [`jaxcam.fitting.fit`][].
 
     Args:
         problem: The problem.

@@ -59,7 +59,7 @@ def profile(
     prior: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Profile:
-    """Compute a profile likelihood: hold one parameter at several values and fit all
+    """Compute a profile likelihood: fix one parameter at several values and fit all
     others.
 
     The example continues that of [`jaxcam.fitting.fit`][].
@@ -69,7 +69,7 @@ def profile(
         name: Name of the parameter.
         reach: Range, in standard errors on both sides.
         points: Number of values, including the optimum.
-        values: Values at which to hold the parameter instead, in any order; a value is
+        values: Values at which to fix the parameter instead, in any order; a value is
             inside the 95 % interval if its cost is below 3.84.
         weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the value used for

@@ -79,7 +79,7 @@ def simulate(
             with padded arrays.
         derivatives: "forward", or "reverse" for gradients with respect to hundreds of
             numbers; both support jvp, linearize, grad and hessian. "reverse" always
-            runs `max_steps` attempts.
+            performs `max_steps` attempts.
         engine: "loop", or "diffeqsolve" for one diffrax call per piece of motion.
         progress: Called at intervals with the completed fraction.
 

@@ -14,18 +14,18 @@ class SwitchedSystem(HybridSystem):
     """A system whose vector field changes when the state crosses a surface.
 
     Subclass it and define two methods. `switching` returns one function per switching
-    surface, which is zero on the surface; `branch` returns the rates of the state for
-    given sides of the surfaces, +1 where the function is positive and -1 where it is
-    negative. Each branch must remain smooth slightly beyond its surfaces. The event
-    loop locates a crossing as accurately as an impact, ends the step there and
-    continues with the other branch. A stiffness with a corner, backlash or a relay
+    surface, which is zero on the surface; `branch` returns the rate of change of the
+    state for given sides of the surfaces, +1 where the function is positive and -1
+    where it is negative. Each branch must remain smooth slightly beyond its surfaces.
+    The event loop locates a crossing as accurately as an impact, ends the step there
+    and continues with the other branch. A stiffness with a corner, backlash or a relay
     therefore causes no loss of accuracy, and crossings have exact derivatives.
 
-    There are no constraints by default; define `gap` and `impact` if the system has
-    impacts, too. `hysteresis` makes a relay of a surface, and `reset` a jump of the
-    state. If both branches drive the motion into a surface, it slides along the surface
-    until one of them leads away; with dry friction, it sticks. `holding` is then the
-    ratio of static to kinetic friction.
+    There are no constraints by default; define `gap` and `impact` if the system also
+    has impacts. `hysteresis` makes a surface switch like a relay, and `reset` makes the
+    state jump at a crossing. If both branches point towards a surface, the motion
+    slides along it until one of them points away; with dry friction, the body sticks.
+    `holding` is then the ratio of static to kinetic friction.
 
     Examples:
         >>> from jaxcam.hybrid import SwitchedSystem
@@ -88,11 +88,11 @@ class SwitchedSystem(HybridSystem):
     def sides(self, t: RealScalar, state: State) -> Float[Array, " k"]:
         """Return the sides on which a motion from this state starts.
 
-        By default the signs of the switching functions. A start on a surface takes the
-        side that the motion enters, or slides; where both branches leave the surface,
-        the motion is not unique, and the side is the one that this returns. With
-        hysteresis the state may allow both: override this, for example with a field of
-        the system.
+        By default, these are the signs of the switching functions. A motion that starts
+        on a surface continues on the side that it enters, or slides. If both branches
+        point away from the surface, the motion is not unique, and this method
+        determines the side. With hysteresis, both sides may be possible; override this
+        method to choose one, for example with a field of the system.
 
         Args:
             t: Time (s).
@@ -106,7 +106,7 @@ class SwitchedSystem(HybridSystem):
 
     @property
     def hysteresis(self) -> Any:
-        """Return how far beyond zero a switching function passes before it switches.
+        """Return how far a switching function passes beyond zero before it switches.
 
         It is a number, or has shape `(k,)`; the default is zero. A motion on the
         positive side switches where the function falls to -hysteresis, and a motion on
@@ -116,10 +116,10 @@ class SwitchedSystem(HybridSystem):
 
     @property
     def holding(self) -> Any:
-        """Return the limit of the force that holds a sliding motion on a surface.
+        """Return the ratio of static to kinetic friction at each surface.
 
-        It is relative to that of the branches, at least one: a number, or shape `(k,)`;
-        one by default. For dry friction it is the ratio of static to kinetic friction.
+        It is the factor by which the limit of the force during sliding exceeds that of
+        the branches: at least one, a number or of shape `(k,)`; default one.
         """
         return 1.0
 

@@ -106,10 +106,10 @@ class HybridSystem(eqx.Module):
     def breakpoints(self) -> Any:
         """Return the times at which a function may change abruptly (s), or `None`.
 
-        The shape is `(k,)`. Steps end exactly at these times, and the vector field, gap
-        and impact law are evaluated only on either side of them, so a switch may be
-        written with `jnp.where(t < b, ...)`. In a system with a `period`, they repeat
-        in every period, at `b + k * period`; otherwise they are times of the run.
+        The shape is `(k,)`. Steps end exactly at these times, so within a step the
+        vector field, gap and impact law are evaluated on only one side of each, and a
+        switch may be written with `jnp.where(t < b, ...)`. In a system with a `period`,
+        they repeat in every period, at `b + k * period`.
         Declare a brief force by the times at which it begins and ends. Keep the number
         small, because each time adds operations to every step.
         """

@@ -101,8 +101,8 @@ def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
 
     It is the smallest root, over all cam angles, of the contact load as a function of
     the speed. At the joints of a motion program, the accelerations on both sides are
-    considered; if the velocity falls at a joint, every speed is too high. The result is
-    differentiable in the parameters.
+    considered; if the slope of the lift falls at a joint, the follower leaves the cam
+    at any speed. The result is differentiable in the parameters.
 
     Args:
         system: The system.

@@ -14,7 +14,7 @@ class DryFrictionOscillator(SwitchedSystem):
 
     `x'' + x = amplitude cos(omega t) - friction sgn(x')`; the state is (x, x'). At x' =
     0 the body sticks until the force on it reaches `static` times `friction`. Without
-    forcing, each half cycle lasts pi and shortens the amplitude by 2 friction.
+    forcing, each half cycle lasts pi and reduces the amplitude by `2 friction`.
 
     J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction,
     Transactions of the ASME 53 (1931), APM-107-115.
@@ -41,7 +41,7 @@ class DryFrictionOscillator(SwitchedSystem):
     amplitude: jax.Array = parameter(1.0)
     """Amplitude of the forcing."""
     static: jax.Array = parameter(1.0)
-    """Largest friction force of the body at rest, over that of the moving body."""
+    """Ratio of the static to the kinetic friction force, at least 1."""
 
     def switching(self, t, state) -> jax.Array:
         """Return the velocity."""
@@ -55,7 +55,7 @@ class DryFrictionOscillator(SwitchedSystem):
 
     @property
     def holding(self) -> jax.Array:
-        """Largest friction force at rest, over that in motion."""
+        """Ratio of the static to the kinetic friction force."""
         return self.static
 
     @property
@@ -64,6 +64,6 @@ class DryFrictionOscillator(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` where a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has no physical meaning."""
         require_positive(omega=self.omega)
         require_not_negative(friction=self.friction, amplitude=self.amplitude)

@@ -20,14 +20,15 @@ class GearBacklash(SwitchedSystem):
     `x'' + 2 damping x' + g(x) = load + amplitude cos(omega t)`, where x is the
     difference of the two gears' displacements along the line of action (the
     transmission error) and half the backlash is `clearance`. The teeth touch on the
-    driving flank for x > clearance, on the other for x < -clearance, and separate in
-    between:
+    driving flank for x > clearance, on the opposite flank for x < -clearance, and are
+    separated in between:
 
         g(x) = x - clearance, x > clearance; 0, |x| < clearance; x + clearance,
         x < -clearance.
 
     The state is (x, x'). Time is in units of the inverse natural frequency of the pair
-    with its teeth in contact. Damping is that of the gears' bearings and acts always.
+    with its teeth in contact. The damping models the bearings and acts even if the
+    teeth are separated.
 
     A. Kahraman, R. Singh, Non-linear dynamics of a spur gear pair, Journal of Sound and
     Vibration 142 (1990), 49-75.
@@ -54,7 +55,7 @@ class GearBacklash(SwitchedSystem):
     amplitude: jax.Array = parameter(0.0)
     """Amplitude of the forcing; default no forcing."""
     omega: jax.Array = parameter(1.0)
-    """Angular frequency of the forcing (of the meshing teeth)."""
+    """Angular frequency of the forcing (the meshing frequency)."""
 
     def switching(self, t, state) -> jax.Array:
         """Return the deflections of the two flanks, positive towards larger x."""

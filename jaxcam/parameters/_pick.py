@@ -25,7 +25,7 @@ class _Marker:
 
 @dataclass(frozen=True)
 class Pick:
-    """The parameters selected by a `where`, without its code.
+    """The parameters selected by a `where`, stored by their positions in the tree.
 
     A `Pick` can be hashed, compared, and sent to another process. If it is called with
     a tree of the same structure, it returns the leaf, or with `several` the tuple of

@@ -8,9 +8,9 @@ from jaxtyping import Array, ArrayLike, Float, Real
 
 
 AnyArray: TypeAlias = Array | np.ndarray
-"""An array in a program, or on the host."""
+"""A JAX or NumPy array."""
 RealScalar: TypeAlias = Real[ArrayLike, ""]
 FloatScalar: TypeAlias = float | Float[AnyArray, ""]
-"""A number that may be an argument of a program."""
+"""A number or a scalar array, which may be an argument of a compiled program."""
 VectorLike: TypeAlias = Float[ArrayLike, " _"] | Sequence[RealScalar]
 """A vector of any length, as an array or a list of numbers."""

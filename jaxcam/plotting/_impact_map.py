@@ -32,7 +32,8 @@ def impact_return_map(
     """Draw impact k+1 against impact k, with the diagonal.
 
     The first panel shows the impact times, the second the approach speeds (the normal
-    speeds just before the impacts). Points on the diagonal are repeating impacts.
+    speeds just before the impacts). A point on the diagonal is an impact that repeats
+    itself.
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.

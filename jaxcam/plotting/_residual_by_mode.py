@@ -35,7 +35,7 @@ def residual_by_mode(
 
     The left panel shows the residuals with a grey +-2 sigma band of the noise; the
     right panel shows their histogram (bars) and that of the noise alone (black line).
-    Impacts have error bars of their standard errors.
+    Error bars at impacts show the standard errors.
 
     Args:
         comparison: The comparison from `jaxcam.recordings.compare` or `compare_case`.

@@ -46,7 +46,7 @@ def special_curves(
         The figure.
 
     Raises:
-        ValueError: A branch is in only one parameter.
+        ValueError: A branch has only one parameter.
 
     Examples:
         >>> import continuation

@@ -15,7 +15,7 @@ class RecordingError(ValueError):
 
 
 class RigError(ValueError):
-    """A rig file cannot be used; one sentence says what to do.
+    """A rig file cannot be used; the message says what to do.
 
     Examples:
         >>> from jaxcam.recordings import RigError, read_rig

@@ -13,7 +13,7 @@ from ._errors import RecordingError
 
 @dataclasses.dataclass(frozen=True)
 class Recording:
-    """One run of one rig, in SI units.
+    """One recording of a rig, in SI units.
 
     Examples:
         >>> from jaxcam.recordings import Recording
@@ -84,7 +84,7 @@ class Recording:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """Several runs of the same rig, usually one folder of files."""
+    """Several recordings of the same rig, usually one folder of files."""
 
     name: str
     """Name of the case."""

@@ -93,7 +93,7 @@ class References:
     with it.
     """
     profile_lead: float = 0.7
-    """Phase (rad) of a twice-per-turn error of the cam profile."""
+    """Phase (rad) of an error of the cam profile with two periods per revolution."""
     stribeck_speed: float = 0.1
     """Stribeck speed (rad/s), up to which friction is larger."""
     slip_speed: float = 0.015
@@ -120,9 +120,7 @@ class References:
         )
 
     def sharper(self, share: float) -> "References":
-        """Return the constants with dry friction that changes sign over a share of the
-        speed.
-        """
+        """Return the constants with the slip speeds of dry friction times a factor."""
         return dataclasses.replace(
             self,
             slip_speed=share * self.slip_speed,

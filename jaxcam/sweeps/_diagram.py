@@ -53,8 +53,8 @@ def diagram(
         direction: With "each", every value starts from the same state; with "up",
             "down" or "both", the state is carried from one value to the next, which
             shows hysteresis.
-        dwell: Times (s) to wait and to record at each value, instead of `turns` and
-            `keep`.
+        dwell: Settling time and recording time (s) at each value, instead of `turns`
+            and `keep`.
         period_tolerance: Tolerance for detecting periods.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         resume: As for [`jaxcam.sweeps.blocks.run_blocks`][].

@@ -21,7 +21,7 @@ def adding_thresholds(
 
     Beyond the interruption, the motion that starts at release has finitely many impacts
     before the next release. Their number falls by one where one of them grazes; these
-    parameter values converge to the interruption by the factor q of
+    parameter values converge to the interruption geometrically, with the ratio q of
     [`variational.scaling_law`][].
 
     Args:

@@ -24,7 +24,7 @@ _TINY = 1e-300
 
 @dataclasses.dataclass(frozen=True)
 class Ripple:
-    """Once-per-turn speed ripple of the drive."""
+    """Speed ripple of the drive, once per revolution."""
 
     eps: float
     """Relative amplitude."""

@@ -152,8 +152,8 @@ class Diagnosis:
     policy: Policy = Policy()
     """The settings of the diagnosis."""
     missing: tuple[MissingFunction, ...] = ()
-    """Unnamed effects, as functions fitted together with the rig; `after` is the model
-    with them.
+    """Unnamed effects, as functions fitted together with the rig parameters; `after`
+    is the model with them.
     """
     misfit: dict[str, float] = dataclasses.field(default_factory=dict)
     """Shares of the misfit of the textbook model in `"flight"`, at an `"impact"` and in

@@ -69,7 +69,8 @@ def strength(
 
     Args:
         unit: Unit shown in tables; `[q]` is replaced by the unit of the coordinate.
-        size: A significant change; it does not influence the result.
+        size: Size of a significant change, for scaling; it does not influence the
+            result.
         lower: Lower bound, for example for a sign required by physics.
         upper: Upper bound.
         default: Value of a new term.

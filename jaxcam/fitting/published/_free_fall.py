@@ -41,7 +41,7 @@ def fit_free_fall(
     """Fit one parameter, and the initial state, to a motion without contact.
 
     The motion of the rig depends on inertia and stiffness only through M = J/K (thesis,
-    eq. 4.9): select one of them with `where`; the other is held.
+    eq. 4.9): select one of them with `where`; the other is fixed.
 
     Args:
         system: The system.

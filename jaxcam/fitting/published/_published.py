@@ -46,8 +46,9 @@ class Published(eqx.Module):
     name: str = eqx.field(static=True)
     """Name of the numbers for the report."""
     compute: Callable[[Any], Float[Array, " k"]]
-    """Function of the model that returns an array `(k,)`; it must be differentiable,
-    like [`variational.impact_orbit`][] and [`variational.fold_of_orbit`][] are.
+    """Function of the model that returns an array `(k,)`; it must be
+    differentiable, as [`variational.impact_orbit`][] and
+    [`variational.fold_of_orbit`][] are.
     """
     values: Float[np.ndarray, " k"]
     """The values as printed, shape `(k,)`."""

@@ -81,7 +81,7 @@ class SwitchKind(enum.IntEnum):
     CROSSES = 0
     """The motion crosses the surface."""
     SLIDES = 1
-    """It begins to slide along the surface: with dry friction, to stick."""
+    """It begins to slide along the surface; with dry friction, the body sticks."""
     LEAVES = 2
     """It leaves the surface along which it slid."""
 
@@ -94,7 +94,7 @@ _SAID = {
 
 
 class Switches(Printed):
-    """The events at switching surfaces, in order; padded as `Impacts` is.
+    """The events at switching surfaces, in order; padded like `Impacts`.
 
     An impact that ends sliding, because it moves the state off the surface, is only
     among the impacts.
@@ -110,12 +110,11 @@ class Switches(Printed):
     surface: Int[AnyArray, " k"]
     """Index of the surface, shape `(k,)`."""
     direction: Float[AnyArray, " k"]
-    """+1 where the switching function rises through the switch or from it, -1 where it
-    falls, shape `(k,)`."""
+    """+1 if the switching function rises at the event, -1 if it falls, shape `(k,)`."""
     count: Int[AnyArray | np.integer, ""]
     """Number of events."""
     kind: Int[AnyArray, " k"]
-    """What happens, as `SwitchKind`: 0 crosses, 1 begins sliding, 2 leaves; shape
+    """Kind of each event (`SwitchKind`): 0 crosses, 1 begins sliding, 2 leaves; shape
     `(k,)`."""
 
     def _batched(self) -> bool:

@@ -304,8 +304,8 @@ def jet_along(system, t, x, contact, field: Callable, multiplier: Callable):
 
 
 def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
-    """Return r of each constraint in the limit of slow impacts: v changes from v to -r
-    v.
+    """Return the coefficient of restitution of each constraint in the limit of slow
+    impacts.
 
     Args:
         system: The system.

@@ -42,8 +42,8 @@ class Surface(eqx.Module):
     sines: Float[Array, " harmonics"]
     """Sine amplitudes of the additional harmonics 2 and 3 (rad)."""
     bend: Float[Array, " waves"]
-    """Amplitudes of a bend, such as a dent, that the harmonics cannot describe; zero
-    without a bend.
+    """Amplitudes of a local deviation, such as a dent, that the harmonics cannot
+    describe; zero without one.
     """
     covariance: Float[Array, " p p"]
     """Covariance of radius, eccentricity, centre, phase and amplitudes."""

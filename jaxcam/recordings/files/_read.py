@@ -44,7 +44,7 @@ def read_recordings(
     Args:
         file: The file; a name such as `..._150.7rpm.csv` gives the nominal speed.
         channels: Required columns (SI names).
-        split: Column with the run number, for a file with several runs.
+        split: Column that numbers the recordings in a file with several of them.
         gaps: `"refuse"` raises an error for a recording with missing samples, `"split"`
             cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
             at long gaps and corrects slips of an encoder (see `mend`). The repairs are
@@ -146,7 +146,7 @@ def read_case(
     Args:
         folder: The folder.
         channels: Required columns (SI names); `()` for rigs other than a cam-follower.
-        split: Column with the run number, for a file with several runs.
+        split: Column that numbers the recordings in a file with several of them.
         gaps: Handling of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
         columns: Names of the columns in order, with `"-"` to skip one, for files
