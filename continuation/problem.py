@@ -68,8 +68,8 @@ class AbstractProblem(eqx.Module):
     functions, differentiable in forward mode): `residual`, `linearisation`,
     `derivatives`, `local_dynamics`, `seen`, `watched`, `scale`. All their non-array
     data must be static, because one program is compiled for each problem structure and
-    reused for all array values in it. `residual` and monitors with `ends=False` must be smooth; where an
-    orbit does not exist, return NaN, and the step is halved.
+    reused for all array values in it. `residual` and monitors with `ends=False` must be
+    smooth; where an orbit does not exist, return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `check`, `transition`, `refreshed`, `eigenvalues`, `representation`, `signature`,

@@ -12,13 +12,13 @@ from .target import Rows, Target
 
 
 RECORDED_NOTE = (
-    "The thesis shows a recording, and the printed values are what it says about the "
-    "recording. The computed ones are simulated at the same speed; the two differ "
-    "where Table 5.1 says so."
+    "The thesis shows a recording; the printed values are taken from its description. "
+    "The computed values are from a simulation at the same speed. The two differ where "
+    "the two columns of Table 5.1 differ."
 )
 WINDOW = (
-    "Sticking erases the past of an orbit, so the chaos beyond the interruption "
-    "contains windows with orbits that stick once in several turns."
+    "The motion after sticking does not depend on the past, so the chaos beyond the "
+    "interruption contains windows with orbits that stick once in several cycles."
 )
 
 

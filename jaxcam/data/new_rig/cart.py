@@ -19,9 +19,8 @@ class Cart(HybridSystem):
     damping: float = 0.3  # divided by the mass (1/s)
     left: float = -0.05  # positions of the stops (m)
     right: float = 0.06
-    restitution_left: float = (
-        0.7  # speed after an impact divided by the speed before it
-    )
+    # speed after an impact divided by the speed before it
+    restitution_left: float = 0.7
     restitution_right: float = 0.7
 
     def vector_field(self, t, state):

@@ -6,12 +6,12 @@ from jaxcam import HybridSystem
 
 
 class Pendulum(HybridSystem):
-    """The angle is that of the encoder; `hanging` is its value straight down."""
+    """The angle is the encoder reading; `hanging` is its value at rest."""
 
     state_names = ("angle", "rate")
     state_units = ("rad", "rad/s")
 
-    stiffness: float = 60.0  # gravity torque over inertia, 1/s^2
+    stiffness: float = 60.0  # torque of gravity divided by the inertia, 1/s^2
     hanging: float = 3.14159  # rad
 
     def vector_field(self, t, state):

@@ -125,4 +125,6 @@ def draw(system: CamFollower) -> Figure:
     return figure
 
 
-TARGET = Target("The Zeno ball, with events and with time steps", compute, draw)
+TARGET = Target(
+    "A bouncing ball, by event detection and by time-stepping", compute, draw
+)

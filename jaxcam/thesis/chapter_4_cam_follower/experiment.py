@@ -53,8 +53,9 @@ def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.D
 
 
 EXPERIMENT_NOTE = (
-    "As in the thesis, ten seconds are recorded after a minute at each speed, forward "
-    "from 120 to 200 rpm and backward to 150 rpm; the thesis does not give the speed "
-    "step. The rig is simulated, so the events are those of the model; Table 5.1 also "
-    "gives those of the real rig. The backward sweep ends before P(1,1) does."
+    "As in the thesis, the motion settles for a minute at each speed and is then "
+    "recorded for ten seconds, with speeds increasing from 120 to 200 rpm and then "
+    "decreasing to 150 rpm; the thesis does not give the speed step. The rig is "
+    "simulated, so the events are those of the model; Table 5.1 also gives those of "
+    "the real rig. The downward sweep ends before P(1,1) does."
 )

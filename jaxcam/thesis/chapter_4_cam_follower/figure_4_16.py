@@ -29,7 +29,7 @@ def compute(system: CamFollower) -> Rows:
             (f"{rpm:g} rpm: height of the first flight", np.nan, heights[0], "rad")
         )
         for k, height in enumerate(heights[1:]):
-            name = f"{rpm:g} rpm: height of bounce {k + 1} relative to the one before"
+            name = f"{rpm:g} rpm: height of rebound {k + 1} relative to the one before"
             rows.append((name, np.nan, height / heights[k], ""))
         rows.append((f"{rpm:g} rpm: sticking time", np.nan, sticking_time(run), "s"))
     return rows

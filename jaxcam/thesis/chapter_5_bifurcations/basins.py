@@ -21,8 +21,8 @@ _TURNS, _KEEP, _RERUNS = 100, 48, 2
 
 
 NO_RINGS = (
-    "The printed figure was made by cell mapping and shows rings; motions simulated "
-    "until they settle all end on one chaotic attractor."
+    "The printed figure, made by cell mapping, shows rings; in simulations that last "
+    "until the steady state, all motions reach one chaotic attractor."
 )
 
 

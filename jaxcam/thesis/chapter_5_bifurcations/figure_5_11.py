@@ -55,7 +55,7 @@ def compute(system: CamFollower, size: str) -> Rows:
             np.mean(repeats),
             "",
         ),
-        ("changes between windows and chaos", np.nan, changes, ""),
+        ("transitions between windows and chaos", np.nan, changes, ""),
         ("speeds at which the run failed", np.nan, np.count_nonzero(~known), ""),
     ]
 

@@ -44,6 +44,7 @@ TARGET = Target(
     "Speeds of the main events, simulated column",
     compute,
     sized=True,
-    note="Read from the diagram of Figure 5.1, and therefore known only to within its "
-    "speed step. The printed end of P(2,2) is the end of the whole diagram.",
+    note="The computed speeds are read from the diagram of Figure 5.1 and are "
+    "therefore known only to within its speed step. The printed end of P(2,2) is the end of the "
+    "diagram.",
 )

@@ -78,7 +78,9 @@ def manifold_rows(system: CamFollower, branches: int) -> Rows:
     for k in range(branches):
         number = np.count_nonzero(np.isfinite(np.asarray(before.speed[k])))
         share = number / before.speed.shape[1]
-        rows.append((f"share of the grazes reached from S^{k + 1}", np.nan, share, ""))
+        rows.append(
+            (f"share of the grazing points reached from S^{k + 1}", np.nan, share, "")
+        )
     return rows
 
 

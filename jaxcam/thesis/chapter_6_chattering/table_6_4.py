@@ -55,4 +55,4 @@ def compute(system: CamFollower) -> Rows:
     return rows
 
 
-TARGET = Target("Closing the loop at the interruption", compute)
+TARGET = Target("The map of one cycle at the interruption", compute)
