@@ -133,7 +133,7 @@ def follow_batch(
         where: As for [`continuation.follow`][].
         bounds: As for [`continuation.follow`][].
         algorithm: Algorithm that corrects in a plane and predicts from a single point,
-            for example along the tangent; default [`continuation.PseudoArclength`][].
+            for example along the tangent; default: [`continuation.PseudoArclength`][].
         parameters: Parameters of the problem; each float leaf has shape `(lanes,)` or
             is a scalar for all branches. Default: those of the problem.
         settings: As for [`continuation.follow`][].

@@ -40,7 +40,7 @@ def branch(
         start: A state `(n,)`, a [`continuation.Start`][] or a [`continuation.Point`][].
         where: Selects the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
-        algorithm: Default [`continuation.PseudoArclength`][].
+        algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: 1 or -1; or `"both"`, in which case the parts towards smaller and
             larger parameters are joined in order and relabelled.

@@ -75,7 +75,7 @@ def cascade(
         start: As for [`continuation.follow`][].
         where: Selects the parameter.
         bounds: (lowest, highest) value of the parameter.
-        algorithm: Default [`continuation.PseudoArclength`][].
+        algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         flips: Number of flips to locate.
         settings: Accuracy and step control.
         callbacks: Called with each point as it is found, for example to show progress.

@@ -100,7 +100,7 @@ def curve(
             and `point.parameter` refer to the second.
         bounds: (lowest, highest) value of both parameters; the curve ends exactly on
             these bounds.
-        algorithm: Default [`continuation.PseudoArclength`][].
+        algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: As for [`continuation.branch`][].
         callbacks: As for [`continuation.branch`][].

@@ -45,7 +45,7 @@ def follow(
             which the branch continues exactly as it did originally.
         where: Selects the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
-        algorithm: Default [`continuation.PseudoArclength`][].
+        algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: 1 to start towards larger parameters, -1 towards smaller ones.
         history: The points before `start`, if that is a point; predictors that use

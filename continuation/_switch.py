@@ -67,7 +67,7 @@ def switch(
         point: A branch point, a flip or a Hopf point of a branch.
         where: Selects the parameter, as for [`continuation.follow`][].
         bounds: (lowest, highest) value of the parameter.
-        algorithm: Default [`continuation.PseudoArclength`][].
+        algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
 
     Returns:

@@ -47,7 +47,7 @@ class Natural(AbstractAlgorithm):
     """
 
     predictor: AbstractPredictor = Extrapolation()
-    """Extrapolates the branch; default linear extrapolation (thesis, eq. 3.40)."""
+    """Extrapolates the branch; default: linear extrapolation (thesis, eq. 3.40)."""
     control: AbstractStepControl = EffortAndAngle()
     """Step control; by default, based on the number of iterations and the angle."""
     component: str = eqx.field(static=True, default="parameter")
@@ -82,7 +82,7 @@ class PseudoArclength(AbstractAlgorithm):
     """
 
     predictor: AbstractPredictor = TangentPredictor()
-    """Extrapolates the branch; default along the tangent."""
+    """Extrapolates the branch; default: along the tangent."""
     control: AbstractStepControl = EffortAndAngle()
     """Step control; by default, based on the number of iterations and the angle."""
     least_norm: ClassVar[bool] = False
@@ -105,7 +105,7 @@ class MoorePenrose(AbstractAlgorithm):
     """
 
     predictor: AbstractPredictor = TangentPredictor()
-    """Extrapolates the branch; default along the tangent."""
+    """Extrapolates the branch; default: along the tangent."""
     control: AbstractStepControl = EffortAndAngle()
     """Step control; by default, based on the number of iterations and the angle."""
     least_norm: ClassVar[bool] = True

@@ -37,7 +37,7 @@ class Start(eqx.Module):
     state: np.ndarray
     """State on or near the branch, shape `(n,)`."""
     parameter: float | None = None
-    """Value of the parameter; default that of `problem.parameters`."""
+    """Value of the parameter; default: that of `problem.parameters`."""
     tangent: np.ndarray | None = None
     """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length
     does not matter. The first point is searched for in the plane perpendicular to it,
@@ -45,13 +45,13 @@ class Start(eqx.Module):
     along the branch through `state`, in the requested direction.
     """
     step: float | None = None
-    """First step; default that of the settings."""
+    """First step; default: that of the settings."""
     reason: str = eqx.field(static=True, default="")
     """A remark on the first point."""
 
 
 class AbstractProblem(eqx.Module):
-    """G(u, parameters) = 0 with u of shape (n,) and G of shape (n,).
+    """A problem G(u, parameters) = 0 with u of shape (n,) and G of shape (n,).
 
     **To define a problem of your own**, subclass this class and provide
 

@@ -32,7 +32,7 @@ from jaxcam.plotting import phase_portrait, style, time_history
 # The state consists of the two displacements and the two velocities. All quantities are
 # dimensionless: mass 1 and the stiffness of each spring are one. Mass 1 is connected to
 # the frame and to mass 2. The stops are at `stop_1` and `stop_2`; each has a gap and a
-# row of `impact`.
+# row in the result of `impact`.
 
 
 class TwoMasses(jaxcam.HybridSystem):

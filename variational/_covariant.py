@@ -77,7 +77,7 @@ def covariant_vectors(
             over which the vectors converge backwards.
         t0: Start time (s).
         transient: Number of periods before and after those returned.
-        settings: Accuracy of the run; default a tolerance of 1e-12.
+        settings: Accuracy of the simulation; the default tolerance is 1e-12.
 
     Returns:
         A `CovariantVectors`. Sticking removes every deviation, so a motion that sticks

@@ -62,7 +62,7 @@ def filippov_monodromy(trajectory: FilippovTrajectory) -> Float[Array, "n n"]:
     It is the product of the derivatives of the flow between switches and the saltation
     matrices at the switches. Over one period of a periodic motion, its eigenvalues are
     the Floquet multipliers, and each sliding interval contributes a zero multiplier. If
-    the run starts in sliding, the start is varied only along the surface.
+    the run starts in sliding, the initial state is varied only along the surface.
 
     Args:
         trajectory: A run of [`jaxcam.filippov.simulate_filippov`][].

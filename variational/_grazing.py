@@ -96,7 +96,7 @@ class GrazingForm(eqx.Module):
 
         Args:
             z: Deviation of the state, shape `(n,)`.
-            mu: Change of the parameters, shape `(q,)`; default none.
+            mu: Change of the parameters, shape `(q,)`; default: none.
 
         Returns:
             The depth; negative if there is no impact.
@@ -109,7 +109,7 @@ class GrazingForm(eqx.Module):
 
         Args:
             z: Deviation of the state, shape `(n,)`.
-            mu: Change of the parameters, shape `(q,)`; default none.
+            mu: Change of the parameters, shape `(q,)`; default: none.
 
         Returns:
             Deviation after the mapping, shape `(n,)`.
@@ -124,7 +124,7 @@ class GrazingForm(eqx.Module):
 
         Args:
             z: Deviation of the state, shape `(n,)`.
-            mu: Change of the parameters, shape `(q,)`; default none.
+            mu: Change of the parameters, shape `(q,)`; default: none.
 
         Returns:
             Deviation one period later, shape `(n,)`.
@@ -140,7 +140,7 @@ class GrazingForm(eqx.Module):
         positive.
 
         Args:
-            mu: Change of the parameters, shape `(q,)`; default none.
+            mu: Change of the parameters, shape `(q,)`; default: none.
 
         Returns:
             A scalar.
@@ -166,7 +166,7 @@ def grazing_form(
         system: The system.
         orbit: A periodic orbit whose gap has a smooth minimum near zero; it may have
             other impacts.
-        where: Selects the parameters mu, one or a tuple; default none.
+        where: Selects the parameters mu, one or a tuple; default: none.
         constraint: Index of the grazed constraint.
 
     Returns:

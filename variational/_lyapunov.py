@@ -85,7 +85,7 @@ def lyapunov_spectrum(
         turn: Length of a period (s); default: the forcing period.
         where: Selects the parameter that differs between motions.
         values: Value of that parameter in each motion, shape `(lanes,)`.
-        settings: Accuracy of the run; default a tolerance of 1e-12.
+        settings: Accuracy of the simulation; the default tolerance is 1e-12.
         blocks: Number of blocks for the standard error.
         max_steps: Maximum number of attempted steps per motion.
         progress: Called with the fraction of periods completed.

@@ -54,7 +54,7 @@ def floquet_multipliers(
         system: The system.
         orbit: The periodic orbit.
         method: As for [`variational.monodromy`][].
-        settings: Accuracy of "flow"; default a tolerance of 1e-12.
+        settings: Accuracy of "flow"; the default tolerance is 1e-12.
 
     Returns:
         Multipliers, shape `(n,)`, complex. At least two are zero if the orbit sticks,

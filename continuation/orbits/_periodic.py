@@ -24,8 +24,7 @@ def periodic_orbits(
     periods: int | None = None,
     beyond: bool = False,
 ) -> Start:
-    """Return the family of periodic orbits to which an orbit belongs, and its position
-    on it.
+    """Return the start of a branch of periodic orbits: a problem and its solution.
 
     The problem depends on the motion: [`continuation.ImpactingOrbits`][] with the
     impacts of the orbit, [`continuation.StickingOrbits`][] if it sticks, or

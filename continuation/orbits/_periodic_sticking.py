@@ -40,7 +40,7 @@ _STEPS = 64
 
 
 class StickingOrbits(AbstractProblem):
-    """P(inf, n): the orbit that leaves contact, chatters, and sticks every n periods.
+    """Orbits P(inf, n), which leave contact, chatter and stick once in n periods.
 
     While it sticks, it follows the constraint, so its state at release is independent
     of the past: it is given by the time t and the state x at which gap, normal velocity

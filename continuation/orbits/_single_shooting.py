@@ -61,7 +61,7 @@ class SingleShooting(AbstractProblem):
     normal: Float[Array, " n"]
     """Unit normal of that plane, shape `(n,)`."""
     settings: Settings
-    """Accuracy of the runs."""
+    """Accuracy of the simulations."""
     periods: int = eqx.field(static=True)
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     turns: int = eqx.field(static=True, default=1)
@@ -77,7 +77,7 @@ class SingleShooting(AbstractProblem):
             system: The system.
             orbit: The orbit.
             periods: Its period in forcing periods; 0 without forcing.
-            settings: Accuracy of the runs.
+            settings: Accuracy of the simulations.
 
         Returns:
             A [`continuation.Start`][].

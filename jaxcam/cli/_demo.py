@@ -20,7 +20,7 @@ def demo(
     ] = None,
     rig: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The rig file; default CASE/rig.toml."),
+        typer.Option(metavar="FILE", help="The rig file; default: CASE/rig.toml."),
     ] = None,
     gaps: Annotated[
         str,

@@ -66,7 +66,7 @@ def _effects(found: Diagnosis) -> list[str]:
         "where",
         "share of the misfit",
         "BIC",
-        "held-out gain (nats)",
+        "gain in held-out ln L",
         "bootstrap",
     )
     rows = [

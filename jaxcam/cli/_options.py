@@ -94,7 +94,7 @@ Case: TypeAlias = Annotated[
 ]
 RigFile: TypeAlias = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="The rig file; default CASE/rig.toml."),
+    typer.Option(metavar="FILE", help="The rig file; default: CASE/rig.toml."),
 ]
 OwnSystem: TypeAlias = Annotated[
     str | None,

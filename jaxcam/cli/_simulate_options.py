@@ -31,7 +31,8 @@ class RunOptions:
         typer.Option(
             metavar="N",
             help=(
-                "Duration in forcing periods (cam cycles), instead of --t1; default 10."
+                "Duration in forcing periods (cam cycles), instead of --t1; default: "
+                "10."
             ),
         ),
     ] = None

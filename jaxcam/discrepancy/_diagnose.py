@@ -48,7 +48,7 @@ def diagnose(
             `sensors`, `parameters` and `drive`.
         recordings: At least two recordings of a rig; for a bare system, segments from
             `jaxcam.recordings.segment`.
-        candidates: Terms that may be named; default `library()`, with the constants of
+        candidates: Terms that may be named; default: `library()`, with the constants of
             the rig. Terms with `listed=False` only help to describe an unknown effect.
         sensors: For a bare system, as for `jaxcam.fitting.Model`.
         parameters: For a bare system, as for `jaxcam.fitting.Problem`.

@@ -99,8 +99,7 @@ def leg_flow(
 ) -> Float[Array, " n"]:
     """Integrate one mode from `t0` to `t1` in equal steps, without events.
 
-    The result is differentiable: it is the flow between two events that variational
-    theory needs.
+    The result is differentiable; saltation and monodromy matrices are computed with it.
 
     Args:
         system: The system.

@@ -66,11 +66,11 @@ def fit(
 
     Args:
         problem: The problem.
-        free: Names of the parameters to fit; default all. The others keep the values of
-            `start`.
-        start: Another fit, or values of some parameters; default the nominal ones.
+        free: Names of the parameters to fit; default: all. The others keep the values
+            of `start`.
+        start: Another fit, or values of some parameters; default: the nominal ones.
         weights: Weight of each piece of the data.
-        prior: Whether the tolerances count as prior knowledge; bounds always hold.
+        prior: Whether the tolerances count as prior knowledge; bounds always apply.
         iterations: Maximum number of iterations.
         stop: Called after each iteration with all costs so far, including that of the
             start; if it returns True, the fit ends without convergence. Long flights

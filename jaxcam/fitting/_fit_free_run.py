@@ -63,7 +63,7 @@ def fit_free_run(
         recordings: Evenly sampled recordings without impacts; each parameter has the
             same value in all of them.
         parameters: Parameters to fit; bounds and scales are used, tolerances are not.
-        start: Initial values of some parameters; default those of the model.
+        start: Initial values of some parameters; default: those of the model.
         samples: Number of samples from which the initial state of a recording is
             estimated.
 

@@ -142,9 +142,9 @@ def identify(
 
     Args:
         problem: The problem.
-        names: Names of the parameters; default all.
-        at: The fit at which to evaluate; default the nominal parameters with the states
-            fitted.
+        names: Names of the parameters; default: all.
+        at: The fit at which to evaluate; default: the nominal parameters with the
+            states fitted.
 
     Returns:
         An [`jaxcam.fitting.Identifiability`][].

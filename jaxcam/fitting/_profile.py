@@ -22,7 +22,7 @@ class Profile:
     name: str
     """Name of the parameter."""
     values: Float[np.ndarray, " k"]
-    """Values at which the parameter was held, shape `(k,)`."""
+    """Values at which the parameter was fixed, shape `(k,)`."""
     cost: Float[np.ndarray, " k"]
     """Minus twice the log-likelihood, relative to the optimum, shape `(k,)`."""
     fits: tuple[Fit, ...]
@@ -131,7 +131,7 @@ def excess_cost(
     weights: Weights | None = None,
     prior: bool = True,
 ) -> float:
-    """Return the cost, relative to the optimum, with several parameters held and all
+    """Return the cost, relative to the optimum, with several parameters fixed and all
     others fitted.
 
     This cost defines the joint confidence region of d parameters of a nonlinear model:

@@ -114,7 +114,7 @@ def is_setup(path: str | Path) -> bool:
         path: The file.
 
     Returns:
-        A flag.
+        True if the file is for `read_setup`.
 
     Raises:
         RigError: The file is not TOML.

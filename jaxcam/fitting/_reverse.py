@@ -77,7 +77,7 @@ def train(
     steps: int = 100,
     progress: Callable[[int, float], None] | None = None,
 ) -> Trained:
-    """Fit part of a model that has very many parameters, such as a neural network.
+    """Fit a part of a model with very many parameters, such as a neural network.
 
     The method is L-BFGS (scipy) with reverse-mode gradients. At each step, the states
     of the pieces are fitted first, so the gradient is that of the cost minimised over

@@ -62,7 +62,7 @@ def flow(
         state: Initial state, shape `(n,)`, with every gap >= 0.
         t0: Start time (s).
         t1: End time (s), t1 >= t0.
-        settings: Accuracy; default `Settings()`.
+        settings: Accuracy; default: `Settings()`.
         max_steps: Maximum number of attempted integration steps.
 
     Returns:

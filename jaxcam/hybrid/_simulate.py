@@ -70,7 +70,7 @@ def simulate(
         t1: End time (s), t1 >= t0.
         tolerance: Error allowed per step, relative to the distance that each component
             moves.
-        solver: Explicit Runge-Kutta solver from diffrax; default `Dopri8`.
+        solver: Explicit Runge-Kutta solver from diffrax; default: `Dopri8`.
         settings: All accuracy settings; overrides `tolerance` and `solver`.
         max_step: Longest integration step (s); briefer forces or narrower barriers may
             be stepped over.

@@ -107,7 +107,7 @@ def stroboscope(
             (`lambda s: s.speed`, or its dotted name), or several.
         values: Value of that parameter in each trajectory, shape `(trajectories,)` or
             `(trajectories, k)`.
-        period: Sampling period (s); default the system's forcing period.
+        period: Sampling period (s); default: the system's forcing period.
         settings: Accuracy settings; the default completes chatter as soon as the theory
             allows.
         block: Number of trajectories advanced together; each that ends is replaced.

@@ -119,7 +119,7 @@ class SwitchedSystem(HybridSystem):
         """Return the ratio of static to kinetic friction at each surface.
 
         It is the factor by which the limit of the force during sliding exceeds that of
-        the branches: at least one, a number or of shape `(k,)`; default one.
+        the branches: at least one, a number or of shape `(k,)`; default: one.
         """
         return 1.0
 

@@ -11,14 +11,14 @@ import numpy as np
 class NormalForm(NamedTuple):
     """A normal form with its branches in closed form.
 
-    It is a field x' = f(x, mu), or a map if `discrete`. For the Hopf bifurcation, x is
-    the radius.
+    It is a vector field x' = f(x, mu), or a map if `discrete`. For the Hopf
+    bifurcation, x is the radius.
     """
 
     title: str
     """Name of the bifurcation."""
     field: Callable
-    """The field or map, `f(x, mu)`."""
+    """The vector field or map, `f(x, mu)`."""
     branches: tuple[Callable, ...]
     """Branches as functions of mu; NaN where they do not exist."""
     discrete: bool = False

@@ -47,7 +47,7 @@ class BilinearOscillator(SwitchedSystem):
     damping: jax.Array = parameter(0.0)
     """Damping ratio."""
     amplitude: jax.Array = parameter(0.0)
-    """Amplitude of the forcing; default no forcing."""
+    """Amplitude of the forcing; default: no forcing."""
     omega: jax.Array = parameter(1.0)
     """Angular frequency of the forcing."""
 

@@ -63,8 +63,8 @@ class CamFollower(AbstractCamDriven):
     [`jaxcam.models.CamProfile`][].
     """
     restitution: eqx.Module = eqx.field(default_factory=LinearInSpeed)
-    """Restitution law `r(speed, approach_speed)`, any module; the approach speed is in
-    rad/s.
+    """Restitution law `r(speed, approach_speed)`, an equinox module; the approach speed
+    is in rad/s.
     """
     rotation: str = eqx.field(default="clockwise", static=True)
     """"clockwise" or "counterclockwise". The tables of the thesis require a cam that

@@ -76,7 +76,7 @@ def pick(
             (`"profile.radius"`), or a tuple of those. A function may return several
             parameters at once.
         tree: A system, or any other pytree with numbers among its leaves.
-        integers: Whether integers may vary too; default floating-point numbers only.
+        integers: Whether integers may vary too; default: floating-point numbers only.
 
     Returns:
         A [`jaxcam.parameters.Pick`][].

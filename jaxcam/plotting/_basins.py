@@ -43,7 +43,7 @@ def basin_picture(
     Args:
         basins: Basins from [`jaxcam.sweeps.basins`][]; components other than those in
             `axes` must have only one value.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         axes: Components to draw along x and y.
         orbits: Whether to mark the points of the attractors.
 

@@ -66,11 +66,11 @@ def branch_diagram(
 
     Args:
         branches: One or several branches from `continuation.branch`.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         value: Function that returns the value or values of a point to draw against the
             parameter; by default, the first component of the states once per forcing
             period, if the points have them, otherwise of the solution.
-        x_label: Name and unit of the x-axis; default the name of the parameter.
+        x_label: Name and unit of the x-axis; default: the name of the parameter.
         y_label: Name and unit of the y-axis.
         x_scale: Factor applied to the parameter (30/pi for a speed in rpm).
         letters: Whether to label the special points in addition to the legend; a label

@@ -15,7 +15,7 @@ def cam_contour(contour: CamContour, ax: Axes | None = None) -> Figure:
 
     Args:
         contour: The contour over a full turn.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
 
     Returns:
         The figure.

@@ -17,7 +17,7 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
 
     Args:
         r: Coefficient of restitution.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         start: Initial values of lambda for the cobwebs; by default, one value on each
             side of the fixed point, with complete and with interrupted chatter.
 
@@ -75,7 +75,7 @@ def beta_lobes(
 
     Args:
         r: Coefficient of restitution.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         measured: Deviations of lambda and values of beta from simulations, drawn below
             the theoretical curve.
         lobes: Number of lobes, starting with the largest.
@@ -119,7 +119,7 @@ def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figu
         distance: Distances, positive, shape `(k,)`.
         height: Heights, positive, shape `(k,)`.
         kappa: Theoretical exponent.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
 
     Returns:
         The figure.

@@ -37,9 +37,9 @@ def chattering_picture(
         frame: The frame from [`variational.chatter_frame`][].
         region: The region from [`variational.chattering_region`][].
         manifold: The manifold from [`variational.grazing_manifold`][].
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         period: Forcing period (s).
-        most: Largest speed to draw; default 1.3 times that of the region.
+        most: Largest speed to draw; default: 1.3 times that of the region.
 
     Returns:
         The figure, with rebound speed against time from release, modulo the period.

@@ -43,7 +43,7 @@ def compare_recording(
         simulated: The simulated channel at the samples of the recording, shape `(k,)`,
             with NaN where it was not simulated; or a comparison that contains the
             recording; or several of these, by name.
-        axes: Two axes; default a new figure.
+        axes: Two axes; default: a new figure.
         channel: The channel to compare.
         contact: Value of the channel in contact with the cam, shape `(k,)`, drawn as
             the surface below the motion.
@@ -51,7 +51,7 @@ def compare_recording(
             +-2 sigma band.
         turns: Number of turns of the cam to draw; without a cam, the entire recording
             is drawn.
-        start: Start time (s); default the first sample.
+        start: Start time (s); default: the first sample.
 
     Returns:
         The figure.

@@ -51,7 +51,7 @@ def sweep_diagram(
 
     Args:
         diagram: The diagram from [`jaxcam.sweeps.diagram`][].
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         component: Component of the state to draw.
         phase: Whether to draw the phase (in periods) of each sample instead, for
             sections that are not sampled once per period.
@@ -159,7 +159,7 @@ def sweep_chart(
 
     Args:
         chart: The chart from [`jaxcam.sweeps.chart`][].
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         start: Index of the start, if there are several.
         x_label: Name and unit of the first parameter.
         y_label: Name and unit of the second parameter.

@@ -28,7 +28,7 @@ def cobweb(
             variational.nordmark_map(x, mu, lam)`.
         start: First point of the orbit.
         turns: Number of iterations to draw.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         skip: Number of initial iterations that are not drawn.
         edge: Value at which impacts begin, which is marked by a dashed line.
         name: Name of the variable, in TeX.

@@ -37,7 +37,7 @@ def impact_return_map(
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
-        axes: Two axes; default a new figure.
+        axes: Two axes; default: a new figure.
         against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), or "time"
             for the time itself (s), which is also used if there is no period.
         period: Forcing period (s); default: that of the system.

@@ -14,7 +14,7 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
 
     Args:
         spectrum: Spectrum of one motion from `variational.lyapunov_spectrum`.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
 
     Returns:
         The figure.

@@ -23,7 +23,7 @@ def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> F
 
     Args:
         program: The motion program.
-        axes: Four axes; default a new figure.
+        axes: Four axes; default: a new figure.
         unit: Unit of the lift, "rad" or "m".
 
     Returns:

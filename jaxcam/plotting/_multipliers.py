@@ -19,7 +19,7 @@ def multipliers(
     Args:
         values: Multipliers, complex, shape `(n,)`, or `(orbits, n)` for the orbits of a
             branch.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         reach: Limit of both axes, which extend from `-reach` to `reach`; by default,
             all multipliers are inside. Multipliers outside are marked at the edge.
 

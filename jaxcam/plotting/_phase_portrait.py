@@ -29,12 +29,12 @@ def phase_portrait(
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
-        ax: Axes to draw on; default a new figure.
+        ax: Axes to draw on; default: a new figure.
         components: Components to draw along x and y.
-        period: Time between stroboscopic points (s); default the forcing period;
+        period: Time between stroboscopic points (s); default: the forcing period;
             without either, no points are drawn.
         phase: Time from `t0` to one of these points (s).
-        between: Time span to draw (s); default the entire trajectory.
+        between: Time span to draw (s); default: the entire trajectory.
         samples: Number of points of a curve, in addition to those that short flights
             need.
 

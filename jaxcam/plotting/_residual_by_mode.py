@@ -39,8 +39,9 @@ def residual_by_mode(
 
     Args:
         comparison: The comparison from `jaxcam.recordings.compare` or `compare_case`.
-        axes: Two axes for each mode and channel, row by row; default a new figure.
-        record: Name of a single recording to draw; default all, each in its own colour.
+        axes: Two axes for each mode and channel, row by row; default: a new figure.
+        record: Name of a single recording to draw; default: all, each in its own
+            colour.
         against: "time" (s), or "phase" for the cam angle within one turn (rad).
 
     Returns:

@@ -36,9 +36,9 @@ def special_curves(
     Args:
         curves: One or several curves from `continuation.curve`, all in the same
             parameters.
-        ax: Axes to draw on; default a new figure.
-        x_label: Name and unit of the first parameter; default its name.
-        y_label: Name and unit of the second parameter; default its name.
+        ax: Axes to draw on; default: a new figure.
+        x_label: Name and unit of the first parameter; default: its name.
+        y_label: Name and unit of the second parameter; default: its name.
         x_scale: Factor applied to the first parameter (30/pi for a speed in rpm).
         y_scale: Factor applied to the second parameter.
 

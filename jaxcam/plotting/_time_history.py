@@ -29,9 +29,9 @@ def time_history(
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
-        axes: Axes for each component and for the gap; default a new figure.
-        components: Components to draw; default all.
-        between: Time span to draw (s); default the entire trajectory.
+        axes: Axes for each component and for the gap; default: a new figure.
+        components: Components to draw; default: all.
+        between: Time span to draw (s); default: the entire trajectory.
         samples: Number of points of a curve, in addition to those that short flights
             need.
 

@@ -110,7 +110,7 @@ def trajectory_curve(
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
-        between: Time span (s); default the entire trajectory.
+        between: Time span (s); default: the entire trajectory.
         samples: Number of points.
 
     Returns:

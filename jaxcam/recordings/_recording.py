@@ -23,7 +23,7 @@ class Recording:
     """
 
     name: str
-    """Name of the run, used in tables and messages."""
+    """Name of the recording, used in tables and messages."""
     time: Float[np.ndarray, " k"]
     """Times of the samples (s), strictly increasing, shape `(k,)`."""
     channels: Mapping[str, Float[np.ndarray, " k"]]
@@ -35,8 +35,8 @@ class Recording:
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Additional information, such as the file."""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Known constants of this run, by the names of system fields: `{"mass": 0.31}`. A
-    fit does not change them.
+    """Known constants of this recording, by the names of system fields: `{"mass":
+    0.31}`. A fit does not change them.
     """
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:

@@ -49,7 +49,7 @@ def basins(
             same attractor.
         reruns: Number of extensions of non-periodic runs, each twice as long as the
             previous one.
-        scale: Scale of the motions, shape `(n,)`; default the largest extent or
+        scale: Scale of the motions, shape `(n,)`; default: the largest extent or
             coordinate of the grid, or the scale of `known`. It matters for a grid that
             is small compared with the attractors.
         known: Basins of the same system whose attractor numbers are to be kept, for

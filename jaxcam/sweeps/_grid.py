@@ -67,7 +67,7 @@ class Grid(eqx.Module):
 
         Args:
             first: First row of the first component.
-            last: Row of the first component before which to stop; default all.
+            last: Row of the first component before which to stop; default: all.
 
         Returns:
             Shape `(motions, n)`.

@@ -132,7 +132,7 @@ def impact_map(system: HybridSystem, time, speed, *, horizon=None):
         system: A system with two states and one constraint.
         time: Time of the impact (s).
         speed: Rebound speed, >= 0, in units of the gap per unit of time.
-        horizon: Longest flight time (s); default one period.
+        horizon: Longest flight time (s); default: one period.
 
     Returns:
         Time and rebound speed of the next impact; NaN if there is none.
@@ -196,7 +196,7 @@ def surface_state(system: HybridSystem, time, speed, guess=None):
         system: A system with two states and one constraint.
         time: Time (s).
         speed: Normal velocity, a scalar.
-        guess: Initial guess for Newton's method; default zeros.
+        guess: Initial guess for Newton's method; default: zeros.
 
     Returns:
         State, shape `(2,)`.

@@ -25,7 +25,7 @@ class ImpactOrbit(eqx.Module):
     states: Float[Array, "k n"]
     """State just after each impact, shape `(k, n)`."""
     constraints: tuple[int, ...] | None = eqx.field(static=True, default=None)
-    """Constraint hit by each impact; default the first."""
+    """Constraint hit by each impact; default: the first."""
     periods: int = eqx.field(static=True, default=1)
     """Number of forcing periods after which the orbit repeats."""
     steps: int = eqx.field(static=True, default=32)

@@ -33,7 +33,7 @@ def monodromy(
             loop. The first is accurate at every impact speed; the second loses one
             digit per decade of decreasing impact speed, because it has to locate the
             impacts again. With switching surfaces, it is always the second.
-        settings: Accuracy of "flow"; default a tolerance of 1e-12.
+        settings: Accuracy of "flow"; the default tolerance is 1e-12.
 
     Returns:
         Shape `(n, n)`.
@@ -68,9 +68,9 @@ def turn_derivative(
         system: The system.
         orbit: The periodic orbit.
         where: Selects one or more parameters of the system, as for
-            [`jaxcam.parameters.pick`][]; default none.
+            [`jaxcam.parameters.pick`][]; default: none.
         method: As for [`variational.monodromy`][].
-        settings: Accuracy of "flow"; default a tolerance of 1e-12.
+        settings: Accuracy of "flow"; the default tolerance is 1e-12.
 
     Returns:
         A [`variational.orbits.TurnDerivative`][].

@@ -125,7 +125,7 @@ def orbit_of(
             derivative there.
         period: Period (s); default: the forcing period.
         t0: Time of `state` (s).
-        settings: Accuracy of the run; default a tolerance of 1e-12.
+        settings: Accuracy of the simulation; the default tolerance is 1e-12.
         closure: Allowed deviation after one period, relative to
             [`jaxcam.hybrid.sizes.component_sizes`][].
 

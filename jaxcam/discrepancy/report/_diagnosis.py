@@ -181,7 +181,7 @@ class Diagnosis:
             )
             for effect in self.effects
         ]
-        headings = ("effect", "parameters", "where", "BIC", "held-out gain (nats)")
+        headings = ("effect", "parameters", "where", "BIC", "gain in held-out ln L")
         case = f"{self.case}: " if self.case else ""
         return ShortTable(f"{case}{self.summary}", headings, rows, headings[:3])
 

@@ -295,7 +295,7 @@ def library(
     Args:
         turned: Whether the system has a drive; without one, there are no profile
             errors.
-        references: Constants of the forms, which belong to a rig (`rig.references`),
+        references: Constants in the terms, which belong to a rig (`rig.references`),
             such as the centre of a nonlinear spring or the reference speed of a
             restitution law.
         clocked: Whether times are known absolutely, from a drive (the default) or a

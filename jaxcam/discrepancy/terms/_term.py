@@ -148,7 +148,7 @@ class Term(eqx.Module):
     sentence: ClassVar[str] = ""
     """The effect, in words that continue "the model lacks"."""
     where: ClassVar[str] = Where.FLIGHT
-    """A [`Where`][jaxcam.discrepancy.terms.Where] or its name; default the first of
+    """A [`Where`][jaxcam.discrepancy.terms.Where] or its name; default: the first of
     `acts`."""
     region: ClassVar[str] = "everywhere"
     """Part of the motion, in words."""

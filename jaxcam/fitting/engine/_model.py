@@ -55,7 +55,7 @@ class Sensor(eqx.Module):
     """Lag (s); it must be short compared with the time scale of the motion."""
     error: Callable | None = eqx.field(default=None, static=True)
     """Systematic error added to the sensor reading in a fit: a function `error(system,
-    t, value, slope)`, where `slope` is the rate of change of `value`; default none.
+    t, value, slope)`, where `slope` is the rate of change of `value`; default: none.
     """
 
     def __check_init__(self):

@@ -30,7 +30,7 @@ class Parameter:
     `tolerance / sqrt(3)`. It is infinite without prior knowledge.
     """
     nominal: float | None = None
-    """Nominal value; default that of the model."""
+    """Nominal value; default: that of the model."""
     scale: float | None = None
     """Size of a relevant change; by default the tolerance, or a hundredth of the value
     if there is none. It does not influence the result.

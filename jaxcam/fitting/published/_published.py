@@ -106,7 +106,7 @@ def fit_published(
         published: The data.
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
-        start: Initial values; default nominal.
+        start: Initial values; default: the nominal values.
         max_steps: Maximum number of evaluations for each scale of the errors.
         progress: Called after each evaluation with its number and the cost.
 

@@ -64,7 +64,7 @@ def check_channels(recording: Recording) -> None:
         recording: The recording.
 
     Raises:
-        RecordingError: A channel is constant, or a lever angle is in degrees.
+        RecordingError: A channel is constant, or an angle appears to be in degrees.
     """
     for name, samples in recording.channels.items():
         # A force or a reference may be constant, but the motion itself may not

@@ -21,7 +21,7 @@ def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
     Args:
         address: "local" for single-threaded processes on this machine, which end with
             the context; or "tcp://host:port" of a running scheduler.
-        workers: Number of local processes; default one per core.
+        workers: Number of local processes; default: one per core.
 
     Returns:
         A context manager that yields the executor.

@@ -38,7 +38,7 @@ class Progress(NamedTuple):
     elapsed: float
     """Time since the start (s)."""
     remaining: float
-    """Expected time until the end (s), NaN before the first block."""
+    """Expected time until the end (s), NaN until the first block is finished."""
 
 
 class AbstractJob(abc.ABC):
@@ -83,9 +83,9 @@ def run_blocks(
         out: Folder for a Zarr group; by default, results are kept in memory.
         resume: Whether to continue with the content of the folder. Missing or damaged
             blocks are recomputed.
-        executor: Any `concurrent.futures.Executor`; default `workers` threads. Results
+        executor: Any `concurrent.futures.Executor`; default: `workers` threads. Results
             do not depend on it.
-        workers: Number of threads; default one per core.
+        workers: Number of threads; default: one per core.
         progress: Called after each block with a [`jaxcam.sweeps.blocks.Progress`][].
 
     Returns:

@@ -17,7 +17,7 @@ from ._section import AbstractSection
 class Map(AbstractSection):
     """A map `function(state, parameters) -> state`; one period is one iteration.
 
-    A motion that diverges keeps its points so far; its code is 3.
+    If a motion diverges, the points computed so far are kept, and its code is 3.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -36,7 +36,7 @@ class Map(AbstractSection):
     t0: float
     """Index of the first iteration."""
     components: tuple[tuple[str, str], ...] = eqx.field(static=True)
-    """Name and unit of each component of the state; default x1, x2, ..."""
+    """Name and unit of each component of the state; default: x1, x2, ..."""
     regular: bool = eqx.field(static=True)
     """Samples are one iteration apart."""
     impacting: bool = eqx.field(static=True)

@@ -102,7 +102,7 @@ class AbstractSection(eqx.Module):
 
 
 def system_names(system, n: int) -> tuple[tuple[str, str], ...]:
-    """Return names and units declared by the class of a system; default x1, x2, ..."""
+    """Return names and units declared by the class of a system; default: x1, x2, ..."""
     names = tuple(getattr(system, "state_names", ()))
     units = tuple(getattr(system, "state_units", ()))
     made = [names[i] if i < len(names) else f"x{i + 1}" for i in range(n)]

@@ -45,6 +45,6 @@ TARGET = Target(
     compute,
     sized=True,
     note="The computed speeds are read from the diagram of Figure 5.1 and are "
-    "therefore known only to within its speed step. The printed end of P(2,2) is the end of the "
-    "diagram.",
+    "therefore known only to within its speed step. The printed end of P(2,2) is the "
+    "end of the diagram.",
 )
