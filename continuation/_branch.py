@@ -47,7 +47,7 @@ def branch(
         callbacks: Called with each point as it is found, for example to show progress
             or to save it. If a callback returns True, the branch ends.
         out: A file to which each point is appended, for [`continuation.load_branch`][];
-            for `"both"`, the first direction has its own file, with `.back` in its name.
+            for `"both"`, the first direction has its own file (`.back` in the name).
         resume: Whether to continue an interrupted call from the points in `out`. The
             result is identical to that of an uninterrupted call.
 

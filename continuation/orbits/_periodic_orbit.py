@@ -105,8 +105,8 @@ def periodic_orbit(
         if orbit is None:
             raise ValueError(
                 f"no periodic orbit of period {length:g} s was found near the guess: "
-                f"{why}; Newton's method on the period map: {later}. Try a guess closer "
-                "to the orbit (for example from a simulation), or another period"
+                f"{why}; Newton's method on the period map: {later}. Try a guess "
+                "closer to the orbit, such as a simulated state, or another period"
             )
     return orbit
 

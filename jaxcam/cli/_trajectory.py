@@ -69,7 +69,7 @@ def contact_table(trajectory: Trajectory) -> Table | None:
         if k is None:
             table.add_row("…")
             continue
-        why = "release" if bool(contacts.released[k]) else "end of the run"
+        why = "release" if bool(contacts.released[k]) else "end of simulation"
         length = f"{end[k] - start[k]:.8f}"
         table.add_row(str(k + 1), f"{start[k]:.8f}", f"{end[k]:.8f}", length, why)
     return table

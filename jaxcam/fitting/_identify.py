@@ -113,7 +113,7 @@ class Identifiability:
             what += f" while lowering {_listed(down)}"
         what += self._relation(direction, members)
         return (
-            f"The data are hardly sensitive to {what}: this combination is set by "
+            f"The data are almost insensitive to {what}: this combination is set by "
             f"the tolerances."
         )
 
