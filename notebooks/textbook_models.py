@@ -49,7 +49,7 @@ hinge = [
 
 
 def read_swings(folder: Path) -> list[Segments]:
-    """Read the swings of the pendulum, each until the pendulum sticks.
+    """Read the swings of the pendulum, each until the pendulum stops.
 
     Every tenth sample is kept: 10 ms is a seventieth of a swing, and at 1000 samples
     per second the rounding errors of neighbouring samples are the same.
@@ -133,7 +133,7 @@ def read_head(folder: Path) -> tuple[Recording, Recording, Recording]:
 
 
 def slower(run: Recording, channel: str, by: str, count: int, part=slice(None)):
-    """Keep every `count`-th sample of a channel and the mean of its input in between.
+    """Keep every `count`-th sample of a channel, and the mean input between these.
 
     The mean preserves the impulse of the input.
     """

@@ -25,7 +25,7 @@ SavedSystem: TypeAlias = Annotated[
     typer.Option(
         "--system",
         metavar="FILE",
-        help="A system written by `jaxcam fit` or `diagnose`, or FILE.py:CLASS.",
+        help="A system written by `jaxcam fit` or `diagnose`, or your own, FILE.py:CLASS.",
     ),
 ]
 Preset: TypeAlias = Annotated[

@@ -26,8 +26,9 @@ _METHODS = {
 class Motion(NamedTuple):
     """The motion at which a term is evaluated.
 
-    `position` and `velocity` are those of the term's `coordinate`. `phase` is the drive
-    angle (rad), or time without a drive; `rate` is the drive speed (rad/s), or one.
+    `position` and `velocity` are those of the term's `coordinate`. Without a
+    drive, `phase` is the time (s) and `rate` is 1; otherwise, they are the drive angle
+    (rad) and the drive speed (rad/s).
     `state` `(n,)` is zero for a term that acts on a surface. `pushed` is the
     acceleration of the position without any terms.
     """
@@ -41,7 +42,7 @@ class Motion(NamedTuple):
     phase: Any
     """Drive angle (rad), or time without a drive."""
     rate: Any = 1.0
-    """Speed of the drive (rad/s), or one."""
+    """Speed of the drive (rad/s), or 1 without a drive."""
     state: Any = None
     """State `(n,)`; zero for a term that acts on a surface."""
     pushed: Any = 0.0
