@@ -25,7 +25,8 @@ SavedSystem: TypeAlias = Annotated[
     typer.Option(
         "--system",
         metavar="FILE",
-        help="A system written by `jaxcam fit` or `diagnose`, or your own, FILE.py:CLASS.",
+        help="A system written by `jaxcam fit` or `diagnose`, or your own system, "
+        "FILE.py:CLASS.",
     ),
 ]
 Preset: TypeAlias = Annotated[

@@ -26,11 +26,10 @@ _METHODS = {
 class Motion(NamedTuple):
     """The motion at which a term is evaluated.
 
-    `position` and `velocity` are those of the term's `coordinate`. Without a
-    drive, `phase` is the time (s) and `rate` is 1; otherwise, they are the drive angle
-    (rad) and the drive speed (rad/s).
-    `state` `(n,)` is zero for a term that acts on a surface. `pushed` is the
-    acceleration of the position without any terms.
+    `position` and `velocity` are those of the term's `coordinate`. Without a drive,
+    `phase` is the time (s) and `rate` is 1; otherwise, they are the drive angle (rad)
+    and the drive speed (rad/s). `state` `(n,)` is zero for a term that acts on a
+    surface. `pushed` is the acceleration of the position without any terms.
     """
 
     t: Any
