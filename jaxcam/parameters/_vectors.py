@@ -10,6 +10,7 @@ from jaxtyping import Array, ArrayLike, Float, Real
 AnyArray: TypeAlias = Array | np.ndarray
 """A JAX or NumPy array."""
 RealScalar: TypeAlias = Real[ArrayLike, ""]
+"""A real number or a scalar array."""
 FloatScalar: TypeAlias = float | Float[AnyArray, ""]
 """A number or a scalar array, which may be an argument of a compiled program."""
 VectorLike: TypeAlias = Float[ArrayLike, " _"] | Sequence[RealScalar]

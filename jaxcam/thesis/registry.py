@@ -47,6 +47,7 @@ def _discovered() -> dict[str, Target]:
 
 
 TARGETS: dict[str, Target] = _discovered()
+"""The targets by name, such as "table-5.2" or "figure-5.14"."""
 
 
 def reproduce(
