@@ -105,7 +105,7 @@ def _iterate(
     # a multiplier that only reaches zero has not released
     pressing = sticking & good & ~lands & ~released & ~carried.completing
     mode = tuple(
-        (landing.mode[k] | (begins & landing.hit[k])) & ~went[k] & active
+        (landing.mode[k] | landing.closing[k]) & ~went[k] & active
         for k in range(functions.m)
     )
     mode = mode + tuple(landing.mode[functions.m :])
@@ -137,6 +137,7 @@ def _iterate(
         lands=lands,
         hit=landing.hit,
         hidden=landing.hidden,
+        loses=landing.loses,
         strikes=landing.strikes,
         stuck=landing.stuck,
         stale=_stale(carried, landing, released),
@@ -305,19 +306,19 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
     """
     hit, chatter, after = landing.hit, landing.chatter, []
     for k, jet in enumerate(jets):
-        ends = landing.begins & hit[k]
         if k >= len(went):
             after.append(jet)
             continue
+        ends = landing.closing[k]
         held = jnp.where(
             pressing & carried.contact[k],
             jnp.minimum(jet.acceleration, 0.0),
             jet.acceleration,
         )
-        acceleration = jnp.where(ends, chatter.acceleration, held)
+        acceleration = jnp.where(ends, landing.pulls[k], held)
         after.append(
             Jet(
-                jnp.where(went[k] | hit[k], 0.0, jet.gap),
+                jnp.where(went[k] | hit[k] | ends, 0.0, jet.gap),
                 jnp.where(went[k], 0.0, jet.velocity),
                 jnp.where(
                     went[k],

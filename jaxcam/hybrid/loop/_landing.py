@@ -10,6 +10,7 @@ from ._flight import StepVerdict
 from ._functions import Functions
 from ._loop_state import LoopState
 from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
+from ._rest_together import loses_energy, rest_together
 from ._select import any_of, of_constraint, select
 from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
@@ -28,11 +29,16 @@ class Landing(NamedTuple):
     hit: list
     impact: Impact
     chatter: Rest
-    # whether the chatter is completed from here
+    # whether the chatter is completed from here, which constraints close then, and the
+    # acceleration of each
     begins: Any
+    closing: list
+    pulls: list
     fastest: Any
     # whether rounding hides the next flight, or the previous one
     hidden: Any
+    # whether the impact loses energy
+    loses: Any
     # whether a constraint is hit, not a switching surface crossed
     strikes: Any
     # whether the motion slides along the surface that it has reached from here, whether
@@ -66,13 +72,10 @@ def land(
     after = after_each[0]
     for k in range(1, len(after_each)):
         after = select(flown.constraint == k, after_each[k], after)
-    approach = of_constraint(
-        [
-            j.velocity + offset * (j.acceleration + offset * j.jerk / 2)
-            for j in made.jets
-        ],
-        flown.constraint,
-    )
+    speeds = [
+        j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in made.jets
+    ]
+    approach = of_constraint(speeds, flown.constraint)
     x = select(lands, after, made.x)
     mode = _kept_contacts(functions, carried, lands, seen, landed, x)
     number = functions.m + functions.k
@@ -104,7 +107,7 @@ def land(
     fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
     if functions.m:
-        chatter = rest_of_chatter(functions, plan, impact, jets, mode, end.stop)
+        chatter = rest_of_chatter(functions, plan, impact, speeds, jets, mode, end.stop)
     else:
         chatter = no_rest(impact)
     # far enough into the sequence, or so low that rounding hides the next flight
@@ -113,6 +116,24 @@ def land(
     # the height of a flight is v^2 / 2a; below 250 times the rounding, it is hidden
     low = 500 * of_constraint(carried.blur, flown.constraint)
     begins = strikes & chatter.possible & (deep | (rebound * rebound <= low * pulled))
+    closing = [begins & h for h in hit[: functions.m]]
+    pulls = [chatter.acceleration] * functions.m
+    if functions.m > 1:
+        natural = jnp.minimum(carried.longest, plan.longest_step)
+        joint = rest_together(
+            functions, impact, jets, mode, hit, natural, fastest, rounding
+        )
+        begins = begins | joint.possible
+        closing = [
+            a | (joint.possible & b)
+            for a, b in zip(closing, joint.closing, strict=True)
+        ]
+        pulls = list(select(joint.possible, joint.multipliers, pulls))
+        chatter = chatter._replace(
+            duration=jnp.where(joint.possible, 0.0, chatter.duration),
+            state=select(joint.possible, joint.state, chatter.state),
+            rate=jnp.where(joint.possible, 0.0, chatter.rate),
+        )
     hidden = _hides(
         carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
     )
@@ -126,8 +147,11 @@ def land(
         impact,
         chatter,
         begins,
+        closing,
+        pulls,
         fastest,
         hidden,
+        strikes & loses_energy(impact),
         strikes,
         slides,
         leaves,

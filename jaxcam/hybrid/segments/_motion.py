@@ -20,6 +20,7 @@ from ..surface import (
     gap_rounding,
     gaps,
     impacts,
+    joint_rest,
     least_gaps,
     lie_derivative,
     lie_series,
@@ -259,6 +260,11 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def impact(self, t, x):
         return impacts(self.system, t, x)
+
+    @_compiled
+    def joint_rest(self, t, x, touching):
+        """Return the state at rest on several constraints, and their multipliers."""
+        return joint_rest(self.system, t, x, touching)
 
     @_compiled
     def completion(self, t, x, contact, k, speed, incoming) -> ChatterEnd:

@@ -18,6 +18,7 @@ from .. import breakpoints
 from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
 from ._events import Flown, TOO_LONG
+from ._joint_end import joint_end, JointEnd
 from ._motion import CompiledMotion, prepared
 
 
@@ -223,22 +224,59 @@ class _Engine:
         self.t, self.x = t, after
         # an impact also counts as an attempt, so that every run ends
         self.steps += 1
-        closed = np.asarray(self.motion.jets(t, after))[:, 0] <= self._tiny(after[None])
+        tiny = self._tiny(after[None])
+        closed = np.asarray(self.motion.jets(t, after))[:, 0] <= tiny
         closed[k] = False
         self.crowded = self.crowded + 1 if np.any(closed & ~self.contact) else 0
         if self.crowded == _MANY:
             self.code = TOGETHER
+        incoming = -float(speeds[0][k])
+        if len(self.contact) > 1 and incoming > 0:
+            end = joint_end(
+                self.motion,
+                t,
+                after,
+                k,
+                self.contact,
+                u / incoming,
+                self.fastest,
+                tiny,
+                self.longest,
+            )
+            if end is not None:
+                self._close(k, before, end)
+                return
         if u <= self.settings.chatter_depth * self.fastest:
-            incoming = -float(speeds[0][k])
             end = self.motion.completion(t, after, self.contact, k, u, incoming)
-            if bool(end.possible) and t + float(end.duration) <= self.end:
-                self.contact = self.contact.copy()
-                self.contact[k] = True
-                self._row(RowKind.LAST_IMPACT, k, t, after, before)
-                self.t, self.x = t + float(end.duration), np.asarray(end.state)
-                self._row(RowKind.CONTACT, k, self.t, self.x)
+            length = float(end.duration)
+            stays = self._stays_alone(k, speeds, length)
+            if bool(end.possible) and stays and t + length <= self.end:
+                kept = self.contact.copy()
+                kept[k] = True
+                self._close(k, before, JointEnd(t + length, end.state, kept))
                 return
         self._row(RowKind.IMPACT, k, t, after, before)
+
+    def _stays_alone(self, k, speeds, length) -> bool:
+        """Return whether no other gap closes during the chatter on constraint `k`.
+
+        Over such a short time a gap is a parabola, whose acceleration includes the mean
+        force of the remaining impacts.
+        """
+        gap, speed, free, _ = np.asarray(self.motion.jets(self.t, self.x)).T
+        jump = speeds[1] - speeds[0]
+        mean = free - free[k] * jump / jump[k] if jump[k] > 0 else free
+        left = gap + length * (speed + length * np.minimum(free, mean) / 2)
+        clear = self.contact | (left > 0)
+        clear[k] = True
+        return bool(np.all(clear))
+
+    def _close(self, k, before, end: JointEnd):
+        """Log the last impact, on constraint `k`, and continue in contact."""
+        self.contact = end.contact
+        self._row(RowKind.LAST_IMPACT, k, self.t, self.x, before)
+        self.t, self.x = end.time, np.asarray(end.state)
+        self._row(RowKind.CONTACT, k, self.t, self.x)
 
     def _no_step(self) -> float:
         """Return the reason why no step is short enough."""
