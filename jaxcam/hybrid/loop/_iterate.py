@@ -21,6 +21,7 @@ from ._gap_polynomial import Jet
 from ._landing import land, Landing
 from ._loop_state import LoopState
 from ._release import judge_contact, lets_go_before
+from ._row_kind import kind_of_switch, row_kind
 from ._select import any_of, of_constraint, select
 from ._series import off_rounding, taylor_of_release
 from ._step import end_of_step, make_step, Step, StepEnd
@@ -149,9 +150,9 @@ def _iterate(
         blur=functions.blur(landing.seen, landing.x, carried.extents, landing.mode),
         held=_suppressed(carried, judged),
     )
-    kind = _kind(carried, lands, begins, released, stopped)
+    kind = row_kind(carried, lands, begins, released, stopped)
     if functions.k:
-        kind = _kind_of_switch(carried, landing, lands, kind)
+        kind = kind_of_switch(carried, landing, lands, kind)
     record = Record(
         kind=jnp.where(good & active, kind, float(RowKind.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
@@ -267,27 +268,6 @@ def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converg
     if functions.planar:
         return shorter
     return jnp.where(converged, shorter, 0.5 * end.length)
-
-
-def _kind(carried, lands, begins, released, stopped):
-    """Return the kind of an accepted attempt in the log: see `RowKind`."""
-    kind = jnp.where(stopped, float(RowKind.STOP), float(RowKind.STEP))
-    kind = jnp.where(carried.completing, float(RowKind.CONTACT), kind)
-    kind = jnp.where(released, float(RowKind.RELEASE), kind)
-    impact = jnp.where(begins, float(RowKind.LAST_IMPACT), float(RowKind.IMPACT))
-    return jnp.where(lands, impact, kind)
-
-
-def _kind_of_switch(carried, landing: Landing, lands, kind):
-    """Return the kind of an attempt that ends at a switching surface, else `kind`."""
-    if carried.stale:
-        again = (carried.stale[0] > 0) & (kind == float(RowKind.STEP))
-        kind = jnp.where(again, float(RowKind.NOTHING), kind)
-    crosses = lands & ~landing.strikes & ~landing.stuck
-    kind = jnp.where(crosses, float(RowKind.SWITCH), kind)
-    kind = jnp.where(landing.slides, float(RowKind.SLIDE), kind)
-    kind = jnp.where(landing.leaves, float(RowKind.LEAVE), kind)
-    return jnp.where(landing.stuck, float(RowKind.STEP), kind)
 
 
 def _stale(carried, landing: Landing, released) -> tuple:

@@ -106,34 +106,20 @@ def land(
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
-    if functions.m:
-        chatter = rest_of_chatter(functions, plan, impact, speeds, jets, mode, end.stop)
-    else:
-        chatter = no_rest(impact)
-    # far enough into the sequence, or so low that rounding hides the next flight
+    ending = _ending(
+        functions,
+        plan,
+        carried,
+        end,
+        impact,
+        speeds,
+        jets,
+        mode,
+        hit,
+        fastest,
+        rounding,
+    )
     pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
-    deep = rebound <= plan.depth * fastest
-    # the height of a flight is v^2 / 2a; below 250 times the rounding, it is hidden
-    low = 500 * of_constraint(carried.blur, flown.constraint)
-    begins = strikes & chatter.possible & (deep | (rebound * rebound <= low * pulled))
-    closing = [begins & h for h in hit[: functions.m]]
-    pulls = [chatter.acceleration] * functions.m
-    if functions.m > 1:
-        natural = jnp.minimum(carried.longest, plan.longest_step)
-        joint = rest_together(
-            functions, impact, jets, mode, hit, natural, fastest, rounding
-        )
-        begins = begins | joint.possible
-        closing = [
-            a | (joint.possible & b)
-            for a, b in zip(closing, joint.closing, strict=True)
-        ]
-        pulls = list(select(joint.possible, joint.multipliers, pulls))
-        chatter = chatter._replace(
-            duration=jnp.where(joint.possible, 0.0, chatter.duration),
-            state=select(joint.possible, joint.state, chatter.state),
-            rate=jnp.where(joint.possible, 0.0, chatter.rate),
-        )
     hidden = _hides(
         carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
     )
@@ -145,10 +131,10 @@ def land(
         jets,
         hit,
         impact,
-        chatter,
-        begins,
-        closing,
-        pulls,
+        ending.chatter,
+        strikes & ending.begins,
+        [strikes & c for c in ending.closing],
+        ending.pulls,
         fastest,
         hidden,
         strikes & loses_energy(impact),
@@ -157,6 +143,48 @@ def land(
         leaves,
         stuck,
     )
+
+
+class _Ending(NamedTuple):
+    """Whether the impacts after one are completed: see `Landing`."""
+
+    chatter: Rest
+    begins: Any
+    closing: list
+    pulls: list
+
+
+def _ending(
+    functions, plan, carried, end, impact, speeds, jets, mode, hit, fastest, rounding
+) -> _Ending:
+    """Complete the impacts after one, on its constraint or on several."""
+    if not functions.m:
+        return _Ending(no_rest(impact), jnp.asarray(False), [], [])
+    chatter = rest_of_chatter(functions, plan, impact, speeds, jets, mode, end.stop)
+    # far enough into the sequence, or so low that rounding hides the next flight: its
+    # height is v^2 / 2a, and below 250 times the rounding, it is hidden
+    deep = impact.rebound <= plan.depth * fastest
+    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], impact.constraint))
+    low = 500 * of_constraint(carried.blur, impact.constraint)
+    hides = impact.rebound * impact.rebound <= low * pulled
+    begins = chatter.possible & (deep | hides)
+    closing = [begins & h for h in hit[: functions.m]]
+    pulls = [chatter.acceleration] * functions.m
+    if functions.m == 1:
+        return _Ending(chatter, begins, closing, pulls)
+    natural = jnp.minimum(carried.longest, plan.longest_step)
+    joint = rest_together(
+        functions, impact, jets, mode, hit, natural, fastest, rounding
+    )
+    both = joint.possible
+    closing = [a | (both & b) for a, b in zip(closing, joint.closing, strict=True)]
+    chatter = chatter._replace(
+        duration=jnp.where(both, 0.0, chatter.duration),
+        state=select(both, joint.state, chatter.state),
+        rate=jnp.where(both, 0.0, chatter.rate),
+    )
+    pulls = list(select(both, joint.multipliers, pulls))
+    return _Ending(chatter, begins | both, closing, pulls)
 
 
 def _kept_contacts(functions, carried, lands, t, before, after):

@@ -1,4 +1,4 @@
-"""End impacts that accumulate on several constraints, in the second engine."""
+"""End impacts that accumulate on one or several constraints, in the second engine."""
 
 from typing import NamedTuple
 
@@ -51,3 +51,23 @@ def joint_end(
             return None
         pull = np.where(touching, -np.asarray(multipliers), pull)
     return JointEnd(t, np.asarray(state), touching)
+
+
+def stays_alone(
+    motion: CompiledMotion, t, x, hit: int, contact, speeds, length
+) -> bool:
+    """Return whether no other gap closes during a chatter on the constraint `hit`.
+
+    Over such a short time a gap is a parabola, whose acceleration includes the mean
+    force of the remaining impacts.
+
+    **Arguments:** the state just after an impact; the normal velocities before and
+    after it, two `(m,)`; and the `length` of the chatter (s).
+    """
+    gap, speed, free, _ = np.asarray(motion.jets(t, x)).T
+    jump = speeds[1] - speeds[0]
+    mean = free - free[hit] * jump / jump[hit] if jump[hit] > 0 else free
+    left = gap + length * (speed + length * np.minimum(free, mean) / 2)
+    clear = contact | (left > 0)
+    clear[hit] = True
+    return bool(np.all(clear))

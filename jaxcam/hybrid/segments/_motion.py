@@ -220,8 +220,8 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def rounding(self, t, x, reach):
         """Return the rounding errors of gaps and normal velocities, `(2, m)`."""
-        found = gap_rounding, speed_rounding
-        return jnp.stack([one(self.system, t, x, reach) for one in found])
+        both = gap_rounding, speed_rounding
+        return jnp.stack([one(self.system, t, x, reach) for one in both])
 
     @_compiled
     def start_room(self, t, x):
@@ -252,9 +252,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def slopes(self, t, x, contact):
-        """Return the absolute derivatives of the rates with respect to the state, `(n,
-        n)`.
-        """
+        """Return the absolute derivatives of the rates by the state, `(n, n)`."""
         return jnp.abs(jax.jacfwd(lambda y: self._field(t, y, contact))(x))
 
     @_compiled

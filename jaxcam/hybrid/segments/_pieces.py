@@ -18,7 +18,7 @@ from .. import breakpoints
 from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
 from ._events import Flown, TOO_LONG
-from ._joint_end import joint_end, JointEnd
+from ._joint_end import joint_end, JointEnd, stays_alone
 from ._motion import CompiledMotion, prepared
 
 
@@ -249,27 +249,13 @@ class _Engine:
         if u <= self.settings.chatter_depth * self.fastest:
             end = self.motion.completion(t, after, self.contact, k, u, incoming)
             length = float(end.duration)
-            stays = self._stays_alone(k, speeds, length)
-            if bool(end.possible) and stays and t + length <= self.end:
+            alone = stays_alone(self.motion, t, after, k, self.contact, speeds, length)
+            if bool(end.possible) and alone and t + length <= self.end:
                 kept = self.contact.copy()
                 kept[k] = True
                 self._close(k, before, JointEnd(t + length, end.state, kept))
                 return
         self._row(RowKind.IMPACT, k, t, after, before)
-
-    def _stays_alone(self, k, speeds, length) -> bool:
-        """Return whether no other gap closes during the chatter on constraint `k`.
-
-        Over such a short time a gap is a parabola, whose acceleration includes the mean
-        force of the remaining impacts.
-        """
-        gap, speed, free, _ = np.asarray(self.motion.jets(self.t, self.x)).T
-        jump = speeds[1] - speeds[0]
-        mean = free - free[k] * jump / jump[k] if jump[k] > 0 else free
-        left = gap + length * (speed + length * np.minimum(free, mean) / 2)
-        clear = self.contact | (left > 0)
-        clear[k] = True
-        return bool(np.all(clear))
 
     def _close(self, k, before, end: JointEnd):
         """Log the last impact, on constraint `k`, and continue in contact."""
