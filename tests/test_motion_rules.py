@@ -77,20 +77,31 @@ def test_two_constraints_are_hit_together(unit, before, together):
 
 
 @pytest.mark.parametrize(
-    ("good", "lands", "hidden", "hops"),
+    ("good", "lands", "hidden", "loses", "hops"),
     [
-        (True, True, True, 4.0),
+        (True, True, True, False, 4.0),
+        # one that loses energy counts less
+        (True, True, True, True, 3.0625),
         # a hop that can be seen ends the row
-        (True, True, False, 0.0),
+        (True, True, False, False, 0.0),
         # no impact, or one of a step that is not taken
-        (True, False, True, 3.0),
-        (False, True, True, 3.0),
+        (True, False, True, False, 3.0),
+        (False, True, True, False, 3.0),
     ],
 )
-def test_hidden_hops_are_counted_at_impacts_that_happen(good, lands, hidden, hops):
+def test_hidden_hops_are_counted_at_impacts_that_happen(
+    good, lands, hidden, loses, hops
+):
     carried = SimpleNamespace(struck=(1.0, 2.0), crowded=(3.0,))
     attempt = SimpleNamespace(
-        good=good, lands=lands, strikes=lands, hidden=hidden, hit=[lands, False], t=5.0
+        good=good,
+        lands=lands,
+        strikes=lands,
+        hidden=hidden,
+        loses=loses,
+        hit=[lands, False],
+        held=(0.0, 0.0),
+        t=5.0,
     )
     struck, (crowded,) = _struck(carried, attempt)
     assert [float(t) for t in struck] == [5.0 if good and lands else 1.0, 2.0]

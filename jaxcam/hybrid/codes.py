@@ -68,11 +68,11 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     backward = "t1 is before t0, but time runs forward: interchange them."
     """t1 is before t0."""
     together = (
-        "Impacts on two or more constraints accumulate together, and the chatter sum "
-        "is valid for one constraint only: choose t1 before this time, or parameters "
-        "with which the impacts on one constraint end before those on the next begin."
+        "Impacts on two or more constraints accumulate, and no contact force would "
+        "then hold the bodies together: choose t1 before this time, or other "
+        "coefficients of restitution."
     )
-    """Impacts on several constraints accumulate together."""
+    """Impacts on several constraints accumulate, and the bodies do not come to rest."""
     accumulates = (
         "Crossings of a switching surface accumulate: each flight off the surface is "
         "shorter than the last. Choose t1 before this time, or give the surface a "

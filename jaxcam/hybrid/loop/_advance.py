@@ -17,7 +17,10 @@ from ._select import any_of, select
 
 # consecutive attempts without progress in time after which a run gives up
 _PATIENCE = 80
-# impacts on two constraints within this fraction of a natural step accumulate together
+# part of one of these attempts for which an impact counts that loses energy: bodies
+# come to rest after many of them
+_LOSSY = 1 / 16
+# impacts on two constraints within this fraction of a natural step accumulate
 _TOGETHER = 1e-3
 # minimum number of steps per forcing period
 _PARTS = 4
@@ -136,8 +139,9 @@ class Attempt(NamedTuple):
     stuck: Any
     # as in `LoopState`
     stale: tuple
-    # a flight hidden by rounding
+    # a flight hidden by rounding; whether an impact loses energy
     hidden: Any
+    loses: Any
     begins: Any
     # a release is near: the step is repeated so that it ends there
     locates: Any
@@ -159,7 +163,7 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
     fixed = (good & attempt.begins) | (carried.completing & ~good) | attempt.locates
     # steps too short to advance the time also count as no progress
     moved = good & (attempt.t > carried.t)
-    failures = jnp.where(moved | ~active, 0.0, carried.failures + 1.0)
+    failures = jnp.where(moved | ~active, 0.0, carried.failures + _weight(attempt))
     stop_gradient = jax.lax.stop_gradient
     waiting = active & any_of(carried.contact) & attempt.finite
     fastest = jnp.where(attempt.released, 0.0, attempt.fastest)
@@ -270,8 +274,15 @@ def _struck(carried, attempt):
         for now, before in zip(attempt.hit, carried.struck, strict=False)
     )
     (crowded,) = carried.crowded
-    more = jnp.where(attempt.hidden, crowded + 1.0, 0.0)
+    more = jnp.where(attempt.hidden, crowded + _weight(attempt), 0.0)
     return struck, (jnp.where(attempt.good & attempt.strikes, more, crowded),)
+
+
+def _weight(attempt):
+    """Return for how many attempts without progress an attempt counts."""
+    if len(attempt.held) < 2:
+        return 1.0
+    return jnp.where(attempt.good & attempt.loses, _LOSSY, 1.0)
 
 
 def _crossed(carried, attempt):

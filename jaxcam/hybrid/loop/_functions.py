@@ -24,6 +24,7 @@ from ..surface import (
     heights_rounded,
     impacts,
     InMode,
+    joint_rest,
     lie_series,
     mode_jet,
     normal_acceleration,
@@ -129,6 +130,8 @@ class Functions:
         self._lift = bind(_lift, time, state)
         self._speed_blur = bind(speed_rounding, time, state, state)
         self._chatter = bind(completion_coefficients, time, state, state)
+        if m > 1:
+            self._joint_rest = bind(joint_rest, time, state, flags)
 
     @contextlib.contextmanager
     def sharing(self):
@@ -258,6 +261,15 @@ class Functions:
         parts = self._chatter(t, _pack(before), _pack(after), *side)
         damping, restitution, rest = parts
         return tuple(damping), tuple(restitution), tuple(map(tuple, rest))
+
+    def joint_rest(self, t, x, touching, mode) -> tuple[tuple, tuple]:
+        """Return the state at rest on the `touching` constraints, and all multipliers.
+
+        Only for several constraints.
+        """
+        flags = _pack(touching)
+        state, found = self._joint_rest(t, _pack(x), flags, *self._side(mode))
+        return tuple(state), tuple(found)
 
     def onto(self, frame: Frame, jets, x, mode):
         """Take one Newton step of the state towards gap = normal velocity = 0."""

@@ -21,6 +21,7 @@ from ._gap_polynomial import Jet
 from ._landing import land, Landing
 from ._loop_state import LoopState
 from ._release import judge_contact, lets_go_before
+from ._row_kind import kind_of_switch, row_kind
 from ._select import any_of, of_constraint, select
 from ._series import off_rounding, taylor_of_release
 from ._step import end_of_step, make_step, Step, StepEnd
@@ -105,7 +106,7 @@ def _iterate(
     # a multiplier that only reaches zero has not released
     pressing = sticking & good & ~lands & ~released & ~carried.completing
     mode = tuple(
-        (landing.mode[k] | (begins & landing.hit[k])) & ~went[k] & active
+        (landing.mode[k] | landing.closing[k]) & ~went[k] & active
         for k in range(functions.m)
     )
     mode = mode + tuple(landing.mode[functions.m :])
@@ -137,6 +138,7 @@ def _iterate(
         lands=lands,
         hit=landing.hit,
         hidden=landing.hidden,
+        loses=landing.loses,
         strikes=landing.strikes,
         stuck=landing.stuck,
         stale=_stale(carried, landing, released),
@@ -148,9 +150,9 @@ def _iterate(
         blur=functions.blur(landing.seen, landing.x, carried.extents, landing.mode),
         held=_suppressed(carried, judged),
     )
-    kind = _kind(carried, lands, begins, released, stopped)
+    kind = row_kind(carried, lands, begins, released, stopped)
     if functions.k:
-        kind = _kind_of_switch(carried, landing, lands, kind)
+        kind = kind_of_switch(carried, landing, lands, kind)
     record = Record(
         kind=jnp.where(good & active, kind, float(RowKind.NOTHING)),
         constraint=jnp.where(released, held.constraint, flown.constraint),
@@ -268,27 +270,6 @@ def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converg
     return jnp.where(converged, shorter, 0.5 * end.length)
 
 
-def _kind(carried, lands, begins, released, stopped):
-    """Return the kind of an accepted attempt in the log: see `RowKind`."""
-    kind = jnp.where(stopped, float(RowKind.STOP), float(RowKind.STEP))
-    kind = jnp.where(carried.completing, float(RowKind.CONTACT), kind)
-    kind = jnp.where(released, float(RowKind.RELEASE), kind)
-    impact = jnp.where(begins, float(RowKind.LAST_IMPACT), float(RowKind.IMPACT))
-    return jnp.where(lands, impact, kind)
-
-
-def _kind_of_switch(carried, landing: Landing, lands, kind):
-    """Return the kind of an attempt that ends at a switching surface, else `kind`."""
-    if carried.stale:
-        again = (carried.stale[0] > 0) & (kind == float(RowKind.STEP))
-        kind = jnp.where(again, float(RowKind.NOTHING), kind)
-    crosses = lands & ~landing.strikes & ~landing.stuck
-    kind = jnp.where(crosses, float(RowKind.SWITCH), kind)
-    kind = jnp.where(landing.slides, float(RowKind.SLIDE), kind)
-    kind = jnp.where(landing.leaves, float(RowKind.LEAVE), kind)
-    return jnp.where(landing.stuck, float(RowKind.STEP), kind)
-
-
 def _stale(carried, landing: Landing, released) -> tuple:
     """Return whether the jets are not those of the new mode: see `LoopState`."""
     if not carried.stale:
@@ -305,19 +286,19 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
     """
     hit, chatter, after = landing.hit, landing.chatter, []
     for k, jet in enumerate(jets):
-        ends = landing.begins & hit[k]
         if k >= len(went):
             after.append(jet)
             continue
+        ends = landing.closing[k]
         held = jnp.where(
             pressing & carried.contact[k],
             jnp.minimum(jet.acceleration, 0.0),
             jet.acceleration,
         )
-        acceleration = jnp.where(ends, chatter.acceleration, held)
+        acceleration = jnp.where(ends, landing.pulls[k], held)
         after.append(
             Jet(
-                jnp.where(went[k] | hit[k], 0.0, jet.gap),
+                jnp.where(went[k] | hit[k] | ends, 0.0, jet.gap),
                 jnp.where(went[k], 0.0, jet.velocity),
                 jnp.where(
                     went[k],

@@ -10,6 +10,7 @@ from ._flight import StepVerdict
 from ._functions import Functions
 from ._loop_state import LoopState
 from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
+from ._rest_together import loses_energy, rest_together
 from ._select import any_of, of_constraint, select
 from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
@@ -28,11 +29,16 @@ class Landing(NamedTuple):
     hit: list
     impact: Impact
     chatter: Rest
-    # whether the chatter is completed from here
+    # whether the chatter is completed from here, which constraints close then, and the
+    # acceleration of each
     begins: Any
+    closing: list
+    pulls: list
     fastest: Any
     # whether rounding hides the next flight, or the previous one
     hidden: Any
+    # whether the impact loses energy
+    loses: Any
     # whether a constraint is hit, not a switching surface crossed
     strikes: Any
     # whether the motion slides along the surface that it has reached from here, whether
@@ -66,13 +72,10 @@ def land(
     after = after_each[0]
     for k in range(1, len(after_each)):
         after = select(flown.constraint == k, after_each[k], after)
-    approach = of_constraint(
-        [
-            j.velocity + offset * (j.acceleration + offset * j.jerk / 2)
-            for j in made.jets
-        ],
-        flown.constraint,
-    )
+    speeds = [
+        j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in made.jets
+    ]
+    approach = of_constraint(speeds, flown.constraint)
     x = select(lands, after, made.x)
     mode = _kept_contacts(functions, carried, lands, seen, landed, x)
     number = functions.m + functions.k
@@ -103,16 +106,20 @@ def land(
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
-    if functions.m:
-        chatter = rest_of_chatter(functions, plan, impact, jets, mode, end.stop)
-    else:
-        chatter = no_rest(impact)
-    # far enough into the sequence, or so low that rounding hides the next flight
+    ending = _ending(
+        functions,
+        plan,
+        carried,
+        end,
+        impact,
+        speeds,
+        jets,
+        mode,
+        hit,
+        fastest,
+        rounding,
+    )
     pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
-    deep = rebound <= plan.depth * fastest
-    # the height of a flight is v^2 / 2a; below 250 times the rounding, it is hidden
-    low = 500 * of_constraint(carried.blur, flown.constraint)
-    begins = strikes & chatter.possible & (deep | (rebound * rebound <= low * pulled))
     hidden = _hides(
         carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
     )
@@ -124,15 +131,60 @@ def land(
         jets,
         hit,
         impact,
-        chatter,
-        begins,
+        ending.chatter,
+        strikes & ending.begins,
+        [strikes & c for c in ending.closing],
+        ending.pulls,
         fastest,
         hidden,
+        strikes & loses_energy(impact),
         strikes,
         slides,
         leaves,
         stuck,
     )
+
+
+class _Ending(NamedTuple):
+    """Whether the impacts after one are completed: see `Landing`."""
+
+    chatter: Rest
+    begins: Any
+    closing: list
+    pulls: list
+
+
+def _ending(
+    functions, plan, carried, end, impact, speeds, jets, mode, hit, fastest, rounding
+) -> _Ending:
+    """Complete the impacts after one, on its constraint or on several."""
+    if not functions.m:
+        return _Ending(no_rest(impact), jnp.asarray(False), [], [])
+    chatter = rest_of_chatter(functions, plan, impact, speeds, jets, mode, end.stop)
+    # far enough into the sequence, or so low that rounding hides the next flight: its
+    # height is v^2 / 2a, and below 250 times the rounding, it is hidden
+    deep = impact.rebound <= plan.depth * fastest
+    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], impact.constraint))
+    low = 500 * of_constraint(carried.blur, impact.constraint)
+    hides = impact.rebound * impact.rebound <= low * pulled
+    begins = chatter.possible & (deep | hides)
+    closing = [begins & h for h in hit[: functions.m]]
+    pulls = [chatter.acceleration] * functions.m
+    if functions.m == 1:
+        return _Ending(chatter, begins, closing, pulls)
+    natural = jnp.minimum(carried.longest, plan.longest_step)
+    joint = rest_together(
+        functions, impact, jets, mode, hit, natural, fastest, rounding
+    )
+    both = joint.possible
+    closing = [a | (both & b) for a, b in zip(closing, joint.closing, strict=True)]
+    chatter = chatter._replace(
+        duration=jnp.where(both, 0.0, chatter.duration),
+        state=select(both, joint.state, chatter.state),
+        rate=jnp.where(both, 0.0, chatter.rate),
+    )
+    pulls = list(select(both, joint.multipliers, pulls))
+    return _Ending(chatter, begins | both, closing, pulls)
 
 
 def _kept_contacts(functions, carried, lands, t, before, after):

@@ -31,11 +31,11 @@ class Impact(NamedTuple):
     constraint: Any
 
 
-def rest_of_chatter(functions, plan, impact: Impact, jets, mode, stop) -> Rest:
+def rest_of_chatter(functions, plan, impact: Impact, speeds, jets, mode, stop) -> Rest:
     """Complete the chatter after an impact; return whether the completion is valid.
 
-    **Arguments:** the `jets` after the impact and the `mode` then, and the time (s) of
-    the next `stop` of the run.
+    **Arguments:** the normal `speeds` before the impact, the `jets` after it and the
+    `mode` then, and the time (s) of the next `stop` of the run.
     """
     t, before, after, approach, rebound, constraint = impact
     dampings, restitutions, states = functions.chatter(t, before, after, mode)
@@ -60,9 +60,13 @@ def rest_of_chatter(functions, plan, impact: Impact, jets, mode, stop) -> Rest:
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
     possible = possible & (a < 0) & (at_end < 0) & soon
     contact = closed(mode, functions.m, len(jets))
+    jump = jnp.where(possible, rebound - approach, 1.0)
     for k, jet in enumerate(jets if len(jets) > 1 else ()):
         # no other gap closes in the meantime; over such a short time, it is a parabola
-        left = jet.gap + duration * (jet.velocity + duration * jet.acceleration / 2)
+        # whose acceleration includes the mean force of the remaining impacts
+        mean = jet.acceleration - a * (jet.velocity - speeds[k]) / jump
+        strongest = jnp.minimum(jet.acceleration, mean)
+        left = jet.gap + duration * (jet.velocity + duration * strongest / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
         possible = possible & clear
     return Rest(possible, duration, state, a, rate)

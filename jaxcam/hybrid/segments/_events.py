@@ -62,7 +62,7 @@ class Flown(NamedTuple):
                 end, slope, i = curve[0][-1, -1], curve[1][-1, -1], count - 2
                 h = float(times[i + 1] - times[i])
                 # tolerance of the interpolant at an event
-                if abs(end) <= abs(slope) * 1e-2 * h + 10 * tiny:
+                if slope < 0 and end <= -slope * 1e-2 * h + 10 * tiny:
                     event = self._locate(k, i, 0.0, None, h)
             if event is not None:
                 # no step ends after t1, so an event there is due to rounding

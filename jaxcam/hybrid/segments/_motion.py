@@ -20,6 +20,7 @@ from ..surface import (
     gap_rounding,
     gaps,
     impacts,
+    joint_rest,
     least_gaps,
     lie_derivative,
     lie_series,
@@ -219,8 +220,8 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def rounding(self, t, x, reach):
         """Return the rounding errors of gaps and normal velocities, `(2, m)`."""
-        found = gap_rounding, speed_rounding
-        return jnp.stack([one(self.system, t, x, reach) for one in found])
+        both = gap_rounding, speed_rounding
+        return jnp.stack([one(self.system, t, x, reach) for one in both])
 
     @_compiled
     def start_room(self, t, x):
@@ -251,14 +252,17 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def slopes(self, t, x, contact):
-        """Return the absolute derivatives of the rates with respect to the state, `(n,
-        n)`.
-        """
+        """Return the absolute derivatives of the rates by the state, `(n, n)`."""
         return jnp.abs(jax.jacfwd(lambda y: self._field(t, y, contact))(x))
 
     @_compiled
     def impact(self, t, x):
         return impacts(self.system, t, x)
+
+    @_compiled
+    def joint_rest(self, t, x, touching):
+        """Return the state at rest on several constraints, and their multipliers."""
+        return joint_rest(self.system, t, x, touching)
 
     @_compiled
     def completion(self, t, x, contact, k, speed, incoming) -> ChatterEnd:

@@ -18,6 +18,7 @@ from .. import breakpoints
 from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
 from ._events import Flown, TOO_LONG
+from ._joint_end import joint_end, JointEnd, stays_alone
 from ._motion import CompiledMotion, prepared
 
 
@@ -223,22 +224,45 @@ class _Engine:
         self.t, self.x = t, after
         # an impact also counts as an attempt, so that every run ends
         self.steps += 1
-        closed = np.asarray(self.motion.jets(t, after))[:, 0] <= self._tiny(after[None])
+        tiny = self._tiny(after[None])
+        closed = np.asarray(self.motion.jets(t, after))[:, 0] <= tiny
         closed[k] = False
         self.crowded = self.crowded + 1 if np.any(closed & ~self.contact) else 0
         if self.crowded == _MANY:
             self.code = TOGETHER
+        incoming = -float(speeds[0][k])
+        if len(self.contact) > 1 and incoming > 0:
+            end = joint_end(
+                self.motion,
+                t,
+                after,
+                k,
+                self.contact,
+                u / incoming,
+                self.fastest,
+                tiny,
+                self.longest,
+            )
+            if end is not None:
+                self._close(k, before, end)
+                return
         if u <= self.settings.chatter_depth * self.fastest:
-            incoming = -float(speeds[0][k])
             end = self.motion.completion(t, after, self.contact, k, u, incoming)
-            if bool(end.possible) and t + float(end.duration) <= self.end:
-                self.contact = self.contact.copy()
-                self.contact[k] = True
-                self._row(RowKind.LAST_IMPACT, k, t, after, before)
-                self.t, self.x = t + float(end.duration), np.asarray(end.state)
-                self._row(RowKind.CONTACT, k, self.t, self.x)
+            length = float(end.duration)
+            alone = stays_alone(self.motion, t, after, k, self.contact, speeds, length)
+            if bool(end.possible) and alone and t + length <= self.end:
+                kept = self.contact.copy()
+                kept[k] = True
+                self._close(k, before, JointEnd(t + length, end.state, kept))
                 return
         self._row(RowKind.IMPACT, k, t, after, before)
+
+    def _close(self, k, before, end: JointEnd):
+        """Log the last impact, on constraint `k`, and continue in contact."""
+        self.contact = end.contact
+        self._row(RowKind.LAST_IMPACT, k, self.t, self.x, before)
+        self.t, self.x = end.time, np.asarray(end.state)
+        self._row(RowKind.CONTACT, k, self.t, self.x)
 
     def _no_step(self) -> float:
         """Return the reason why no step is short enough."""

@@ -13,6 +13,7 @@ from ._impact_law import (
     check_restitution as check_restitution,
     restitutions as restitutions,
 )
+from ._joint_rest import joint_rest as joint_rest
 from ._normal import (
     contact_multipliers as contact_multipliers,
     field_in_force as field_in_force,

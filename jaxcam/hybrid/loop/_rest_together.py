@@ -1,0 +1,74 @@
+"""Complete impacts that accumulate on several constraints at once.
+
+Such a sequence has no closed form: the order of the impacts may never repeat. They are
+followed until their flights are negligible, and then all of these constraints close.
+"""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ._functions import Functions
+from ._rest_of_chatter import Impact
+from ._select import any_of, largest
+
+
+# Flights shorter than this fraction of a natural step are negligible
+_SHORT = 1e-8
+# Normal velocities below this fraction of the fastest rebound are negligible
+_SLOW = 1e-13
+# Largest ratio of the normal velocities at an impact that loses energy
+_LOSSY = 1 - 1e-9
+
+
+class JointRest(NamedTuple):
+    """The end of impacts that accumulate on several constraints."""
+
+    possible: Any
+    state: tuple
+    # which constraints close; multiplier of each constraint
+    closing: list
+    multipliers: tuple
+
+
+def rest_together(
+    functions: Functions, impact: Impact, jets, mode, hit, natural, fastest, rounding
+) -> JointRest:
+    """Return whether the impacts after this one, on several constraints, are
+    negligible.
+
+    **Arguments:** the `jets` after the impact, the `mode` then, which constraint was
+    `hit`, the natural length of a step (s), the `fastest` rebound so far, and the
+    `rounding` of each gap.
+    """
+    m = functions.m
+    small = (_SHORT * natural) ** 2, (_SLOW * fastest) ** 2
+    strongest = largest([jnp.abs(jet.acceleration) for jet in jets[:m]])
+    near = [~mode[k] & _ends(jets[k], strongest, *small, rounding[k]) for k in range(m)]
+    closing = [hit[k] | near[k] for k in range(m)]
+    touching = tuple(closing[k] | mode[k] for k in range(m))
+    state, multipliers = functions.joint_rest(impact.t, impact.after, touching, mode)
+    several = sum(jnp.where(closes, 1.0, 0.0) for closes in closing) > 1
+    possible = any_of(hit[:m]) & loses_energy(impact) & several
+    for k in range(m):
+        pull = -multipliers[k]
+        possible = possible & (~touching[k] | (pull >= 0))
+        ends = _ends(jets[k], pull, *small, rounding[k])
+        possible = possible & (~closing[k] | ends)
+    return JointRest(possible, state, closing, multipliers)
+
+
+def loses_energy(impact: Impact):
+    """Return whether the rebound is slower than the approach."""
+    return impact.rebound < -_LOSSY * impact.approach
+
+
+def _ends(jet, pull, short, slow, rounding):
+    """Return whether a gap remains closed but for flights that are negligible.
+
+    **Arguments:** the acceleration `pull` (positive) towards the constraint, and the
+    squares of a negligible time and of a negligible velocity.
+    """
+    height = jnp.maximum(short * pull, 50 * rounding)
+    low = jet.velocity * jet.velocity <= jnp.maximum(height * pull, slow)
+    return low & (jnp.abs(jet.gap) <= height)

@@ -1,0 +1,52 @@
+"""Bodies that come to rest on several constraints at the same time."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from .._system import HybridSystem
+from .._types import RealScalar, State
+from ._masked import solve_masked
+from ._normal import gaps, normal_acceleration, normal_directions, normal_velocity
+
+
+def joint_rest(
+    system: HybridSystem, t: RealScalar, x: State, touching: Bool[Array, " m"]
+) -> tuple[State, Float[Array, " m"]]:
+    """Return the state at rest on the `touching` constraints, and their multipliers.
+
+    Gaps and normal velocities are removed by one Newton step each: gaps along their
+    gradients, velocities along the impulses.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State close to rest on these constraints, shape `(n,)`.
+        touching: Which constraints are meant, shape `(m,)`.
+
+    Returns:
+        The state, shape `(n,)`, and the multipliers q of
+            [`field_in_force`][jaxcam.hybrid.surface.field_in_force], shape `(m,)`;
+            a contact is compressive if q < 0.
+
+    Examples:
+        >>> from jaxcam.hybrid.surface import joint_rest
+        >>> from jaxcam.models import BouncingBall
+        >>> state, q = joint_rest(
+        ...     BouncingBall(), 0.0, jnp.array([1e-9, 1e-5]), jnp.array([True])
+        ... )
+        >>> state.tolist(), q.tolist()
+        ([0.0, 0.0], [-9.81])
+    """
+    t = jnp.asarray(t, dtype=jnp.float64)
+    gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
+    slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
+    lift = gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
+    push = normal_directions(system, t, x)
+    coupling = slope @ push.T
+    heights = solve_masked(gradient @ lift.T, gaps(system, t, x), touching)
+    lowered = heights @ lift
+    speeds = normal_velocity(system, t, x) - slope @ lowered
+    stopped = solve_masked(coupling, speeds, touching) @ push
+    multipliers = solve_masked(coupling, normal_acceleration(system, t, x), touching)
+    return x - lowered - stopped, multipliers
