@@ -135,6 +135,7 @@ def test_a_record_that_says_nothing_has_the_value_of_the_rig(tmp_path):
     np.testing.assert_array_equal(values[2, 3:], [1.0, 5.0])
 
 
+@pytest.mark.slow
 def test_a_diagnosis_knows_it_too(tmp_path):
     """The terms that could be missing are fitted beside the same constants."""
     setup = setup_of(tmp_path)

@@ -267,6 +267,7 @@ def reference():
     return batch(SPEED, LIFT, jnp.asarray(1e-12))
 
 
+@pytest.mark.slow
 def test_events_do_not_depend_on_the_batch(reference):
     assert len({int(c) for c in reference["hits"]}) > 4  # lanes differ
     three = batch(SPEED[2:5], LIFT[2:5], jnp.asarray(1e-12))

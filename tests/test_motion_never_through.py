@@ -135,7 +135,10 @@ def describe(system, state, tolerance, k):
     return (type(system).__name__, values, state[k].tolist(), float(tolerance[k]))
 
 
-@pytest.mark.parametrize("kind", [oscillators, balls, cams, springs])
+KINDS = [oscillators, balls, cams, pytest.param(springs, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @SLOW
 @example(seed=874)  # two crossings in one step, of which the later was taken
 @given(seed=st.integers(0, 10**6))
@@ -154,7 +157,7 @@ def test_gap_stays_positive_in_every_lane(kind, seed):
         assert float(one["sample gap"]) >= floor, which
 
 
-@pytest.mark.parametrize("kind", [oscillators, balls, cams, springs])
+@pytest.mark.parametrize("kind", KINDS)
 def test_lanes_are_their_single_runs(kind):
     system, state, t1, tolerance = random_batch(kind, 7)
     tolerance = jnp.minimum(tolerance, 1e-9)

@@ -44,7 +44,9 @@ def _arrival(state, t0, t1):
     return made.code, made.state, made.state, made.impacts
 
 
-@pytest.mark.parametrize("run", [_trajectory, _arrival])
+@pytest.mark.parametrize(
+    "run", [pytest.param(_trajectory, marks=pytest.mark.slow), _arrival]
+)
 def test_starts_that_cannot_be_have_a_code_and_nan(run):
     """In a batch, next to lanes that are not affected: bit for bit as without them."""
     states, t0, t1, codes = (jnp.asarray(part) for part in zip(*_STARTS, strict=True))

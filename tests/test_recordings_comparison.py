@@ -72,7 +72,7 @@ def recorded(folder, real, seed):
     return segment_case(recordings, read_rig(DEMO_RIG / "rig.toml"))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_nothing_is_left_where_nothing_is_missing(tmp_path, seed):
     real = RealRig(damping=0.0)
     found = compare_case(true_rig(real), recorded(tmp_path, real, seed))

@@ -66,7 +66,11 @@ def touched(gap) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("size", "place", "width"),
-    [(1.5e-4, 3.6, 0.25), (-2.5e-4, 2.4, 0.15), (3e-4, 0.6, 0.4)],
+    [
+        (1.5e-4, 3.6, 0.25),
+        pytest.param(-2.5e-4, 2.4, 0.15, marks=pytest.mark.slow),
+        pytest.param(3e-4, 0.6, 0.4, marks=pytest.mark.slow),
+    ],
     ids=["where it is released", "a hollow", "a wide one"],
 )
 def test_a_dented_cam_is_cut_right(size, place, width):

@@ -294,7 +294,7 @@ def test_a_sensor_that_lags_shifts_the_phase_of_the_cam():
     assert abs(float(surface.phase) + late) < 0.2 * late
 
 
-@pytest.mark.parametrize("seed", [4, 8])
+@pytest.mark.parametrize("seed", [4, pytest.param(8, marks=pytest.mark.slow)])
 def test_a_cam_seen_in_bounces_alone_stays_near_them(seed):
     """Where bounces are too low to be seen the cam is within three and a half noises.
 

@@ -29,10 +29,14 @@ from jaxcam.models import BeltOscillator, CamFollower, simulate_through_joints
 _HERE = Path(__file__).parent
 _QUICK = [
     ("simulate:faq-ball", ("jit", "vmap", "jvp", "linearize", "grad")),
-    ("simulate:faq-ball", ("jacfwd", "hessian", "least_squares")),
+    pytest.param(
+        "simulate:faq-ball",
+        ("jacfwd", "hessian", "least_squares"),
+        marks=pytest.mark.slow,
+    ),
     ("simulate:readme-pendulum", ("linearize", "grad")),
     # runs of constants in a loop of optimistix
-    ("simulate:cam", ("least_squares",)),
+    pytest.param("simulate:cam", ("least_squares",), marks=pytest.mark.slow),
 ]
 
 
