@@ -8,9 +8,7 @@ from scipy.linalg import expm
 from switched_systems import Affine, random_affine
 
 import jaxcam
-import variational
 from jaxcam.hybrid import flow, Settings
-from jaxcam.models import BilinearOscillator
 from variational import switching_saltation
 
 
@@ -92,9 +90,3 @@ def _compare(system, state, by_system, by_state):
 def _at_level(system, i, by):
     *rest, levels, width = jax.tree.leaves(system)
     return (*rest, levels.at[i].add(by), width)
-
-
-def test_what_knows_no_surfaces_says_so():
-    system = BilinearOscillator(amplitude=0.5, damping=0.1)
-    with pytest.raises(ValueError, match="switching surfaces"):
-        variational.lyapunov_spectrum(system, [0.1, 0.0])

@@ -1,12 +1,14 @@
 """Lyapunov exponents: sum rule, multipliers, and motions that stick."""
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from textbook_systems import parameters
 
 import variational
-from jaxcam.models import ImpactOscillator
+from jaxcam.models import BilinearOscillator, DryFrictionOscillator, ImpactOscillator
 from variational._lyapunov import _in_turn, LyapunovSpectrum
 
 
@@ -100,3 +102,58 @@ def test_blocks_of_lanes_are_put_together_in_order(lanes, each):
     np.testing.assert_array_equal(made.exponents, states)
     np.testing.assert_array_equal(made.impact_rate, states[:, 0])
     np.testing.assert_array_equal(made.turn, lengths if each else np.ones(1))
+
+
+@pytest.fixture(scope="module")
+def bilinear():
+    """Three motions of an oscillator with two stiffnesses."""
+    system = BilinearOscillator(
+        **parameters(stiffness=4.0, stop=0.0, damping=0.2, amplitude=1.0, omega=1.0)
+    )
+    omega = np.array([0.5, 1.0, 3.0])
+    return (
+        system,
+        omega,
+        variational.lyapunov_spectrum(
+            system, [0.1, 0.0], 64, transient=96, where=lambda s: s.omega, values=omega
+        ),
+    )
+
+
+def test_sum_rule_with_a_switching_surface(bilinear):
+    """The flow contracts areas at a constant rate: to 1e-10."""
+    system, _, made = bilinear
+    assert np.all(np.asarray(made.code) == 0)
+    divergence = float(
+        jnp.trace(
+            jax.jacfwd(lambda x: system.vector_field(0.0, x))(jnp.array([0.3, 0.2]))
+        )
+    )
+    np.testing.assert_allclose(made.exponents.sum(axis=1), divergence, atol=1e-10)
+
+
+def test_exponents_of_a_switched_orbit_are_those_of_its_multipliers(bilinear):
+    system, omega, made = bilinear
+    one = eqx.tree_at(lambda s: s.omega, system, jnp.asarray(omega[1]))
+    orbit = variational.orbit_of(one, made.state[1])
+    exact = np.log(np.sort(np.abs(np.asarray(orbit.multipliers)))[::-1])
+    exact = exact / float(orbit.period)
+    np.testing.assert_allclose(made.exponents[1], exact, atol=3 / 64)
+
+
+def test_sticking_by_dry_friction_makes_minus_infinity():
+    """Sticking at zero velocity removes the deviation of the velocity."""
+    system = DryFrictionOscillator(**parameters(omega=0.25, friction=0.4))
+    made = variational.lyapunov_spectrum(system, [0.5, 0.0], 16, transient=16)
+    assert int(made.code) == 0
+    assert np.isfinite(made.exponents[0]) and np.isneginf(made.exponents[1])
+
+
+def test_hysteresis_is_refused():
+    class Relay(BilinearOscillator):
+        @property
+        def hysteresis(self):
+            return 0.1
+
+    with pytest.raises(ValueError, match="does not support hysteresis"):
+        variational.lyapunov_spectrum(Relay(), [0.1, 0.0], 16)

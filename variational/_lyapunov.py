@@ -1,7 +1,8 @@
 """Compute Lyapunov exponents of a motion with impacts.
 
 The event loop runs without derivatives. Afterwards, the derivatives of all steps in its
-log are computed at once and multiplied in order.
+log are computed at once and multiplied in order. Systems with switching surfaces are
+differentiated period by period instead.
 """
 
 from collections.abc import Callable
@@ -12,14 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import HybridSystem, Settings
+from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.checks import refuse_tracers
 from jaxcam.hybrid.codes import RowKind, RUNNING
 from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
-from ._switching import refuse_switched
-from ._tangent_lanes import Carried, first_frames, next_rows, ROWS
+from ._tangent_lanes import first_frames, next_rows, ROWS
+from ._turn_frames import first_turn, next_turns
 
 
 class LyapunovSpectrum(eqx.Module):
@@ -94,7 +95,8 @@ def lyapunov_spectrum(
         A `LyapunovSpectrum`; exponents are minus infinity if the motion sticks.
 
     Raises:
-        ValueError: Shapes are inconsistent, or there is no period.
+        ValueError: Shapes are inconsistent, there is no period, or a switching surface
+            has a hysteresis.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -106,7 +108,13 @@ def lyapunov_spectrum(
     """
     inputs = system, state, values, t0, turn
     refuse_tracers("lyapunov_spectrum", "jax.jacfwd of jaxcam.hybrid.flow", *inputs)
-    refuse_switched(system, "lyapunov_spectrum")
+    switched = isinstance(system, SwitchedSystem)
+    if switched and np.any(np.asarray(system.hysteresis) != 0):
+        raise ValueError(
+            "lyapunov_spectrum does not support hysteresis, because the state at the "
+            "start of a period does not determine the side; differentiate "
+            "jaxcam.hybrid.flow over the whole motion with jax.jacfwd"
+        )
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()
     if turn is None and system.period is None:
@@ -134,23 +142,48 @@ def lyapunov_spectrum(
 
     def some(batched, states):
         nonlocal done
-        carry = first_frames(batched, shared, length, states, begin, end, settings)
         seen = _Seen(states.shape[0], transient + turns + 1, states.shape[1])
-        used = 0
-        while used < max_steps and np.any(np.asarray(carry.lane.status) == RUNNING):
-            carry, rows = next_rows(
-                batched, shared, length, begin, end, settings, carry
-            )
-            seen.take(*map(np.asarray, rows))
-            used += ROWS
+
+        def report():
             if progress is not None:
                 progress(done + seen.share * states.shape[0] / padded)
+
+        run = _by_turns if switched else _by_steps
+        given = batched, shared, length, begin, end, settings, max_steps
+        status = run(states, *given, seen, report)
         done += states.shape[0] / padded
-        return _summary(seen, carry, _turn(batched, shared, length), transient, blocks)
+        return _summary(seen, status, _turn(batched, shared, length), transient, blocks)
 
     padded = _padded(states.shape[0])
     made = _in_turn(some, batched, states)
     return jax.tree.map(lambda leaf: leaf[0], made) if single else made
+
+
+def _by_steps(
+    states, batched, shared, length, begin, end, settings, max_steps, seen, report
+):
+    """Fill `seen` from the derivatives of steps; return a code for each motion."""
+    carry = first_frames(batched, shared, length, states, begin, end, settings)
+    used = 0
+    while used < max_steps and np.any(np.asarray(carry.lane.status) == RUNNING):
+        carry, rows = next_rows(batched, shared, length, begin, end, settings, carry)
+        seen.take(*map(np.asarray, rows))
+        used += ROWS
+        report()
+    return carry.lane.status
+
+
+def _by_turns(
+    states, batched, shared, length, begin, end, settings, max_steps, seen, report
+):
+    """Fill `seen` from the derivatives of periods; return a code for each motion."""
+    del end, max_steps
+    carry = first_turn(states)
+    while not seen.complete:
+        carry, after = next_turns(batched, shared, length, begin, settings, carry)
+        seen.take_turns(*map(np.asarray, (after.logs, after.impacts, after.state)))
+        report()
+    return carry.code
 
 
 def _padded(lanes: int) -> int:
@@ -199,6 +232,20 @@ class _Seen:
         done, most = self._filled - 1, self.logs.shape[1] - 1
         return float(np.mean(np.minimum(done, most))) / most
 
+    @property
+    def complete(self) -> bool:
+        """Return whether every period is filled."""
+        return bool(np.all(self._filled >= self.logs.shape[1]))
+
+    def take_turns(self, logs, hits, after) -> None:
+        """Add values at the ends of the next periods, `(lanes, turns, ...)`."""
+        first = int(self._filled[0])
+        count = min(logs.shape[1], self.logs.shape[1] - first)
+        self.logs[:, first : first + count] = logs[:, :count]
+        self.hits[:, first : first + count] = hits[:, :count]
+        self.states[:] = after[:, count - 1]
+        self._filled += count
+
     def take(self, kind, logs, after) -> None:
         hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)
         hits = self._hits[:, None] + np.cumsum(hit, axis=1)
@@ -215,7 +262,7 @@ class _Seen:
         self._hits = hits[:, -1]
 
 
-def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
+def _summary(seen: _Seen, status, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
         # the difference of two infinities: the motion stuck before and during this
@@ -230,7 +277,7 @@ def _summary(seen: _Seen, carry: Carried, length, transient, blocks):
         error = means.std(axis=1, ddof=1) / np.sqrt(blocks)
     error = np.where(np.isneginf(local).any(axis=1), 0.0, error)
     impacts = seen.hits[:, -1] - seen.hits[:, transient]
-    status = np.asarray(carry.lane.status).astype(int)
+    status = np.asarray(status).astype(int)
     return LyapunovSpectrum(
         exponents=jnp.asarray(local.mean(axis=1)),
         stderr=jnp.asarray(error),

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import HybridSystem, SwitchedSystem
+from jaxcam.hybrid import SwitchedSystem
 from jaxcam.hybrid.surface import OnSides, resets, surfaces
 
 from ._event_law import event_crossing
@@ -58,12 +58,3 @@ def switching_saltation(
         x,
     )
     return law_x + jnp.outer(moved, normal) / speed
-
-
-def refuse_switched(system: HybridSystem, name: str) -> None:
-    """Raise `ValueError` in a function that does not support switching surfaces."""
-    if isinstance(system, SwitchedSystem):
-        raise ValueError(
-            f"{name} does not include switching surfaces; differentiate "
-            "jaxcam.hybrid.flow with jax.jacfwd, which does"
-        )

@@ -1,0 +1,77 @@
+"""Propagate tangent vectors by the derivative of the flow over each period."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import flow
+
+from ._step_matrix import elementwise_product
+from ._tangent_lanes import orthonormal
+
+
+# periods between two checks from Python
+TURNS = 16
+# attempted steps in one period, after which a motion is given up
+_MOST_STEPS = 100_000
+
+
+class TurnFrame(NamedTuple):
+    """The state of one motion at the start of a period."""
+
+    state: Float[Array, " n"]
+    frame: Float[Array, "n n"]
+    # sums of the logarithms of growth, and number of impacts so far
+    logs: Float[Array, " n"]
+    impacts: Float[Array, ""]
+    turn: Float[Array, ""]
+    # the first code other than success
+    code: Array
+
+
+def first_turn(states: Float[Array, "lanes n"]) -> TurnFrame:
+    """Return the start of the first period of each motion."""
+    lanes, n = states.shape
+    none = jnp.zeros(lanes)
+    frames = jnp.broadcast_to(jnp.eye(n), (lanes, n, n))
+    code = jnp.zeros(lanes, dtype=jnp.int32)
+    return TurnFrame(states, frames, jnp.zeros((lanes, n)), none, none, code)
+
+
+@eqx.filter_jit
+def next_turns(batched, shared, length, begin, settings, carry: TurnFrame):
+    """Run the next `TURNS` periods; return the carried state, and its values at the end
+    of each period, `(lanes, TURNS, ...)`.
+    """
+
+    def one(batched, carry):
+        system = eqx.combine(batched, shared)
+        span = system.period if length is None else length
+
+        def turn(carry: TurnFrame, _):
+            t = begin + carry.turn * span
+
+            def end(x):
+                made = flow(
+                    system, x, t, t + span, settings=settings, max_steps=_MOST_STEPS
+                )
+                return made.state, made
+
+            matrix, made = jax.jacfwd(end, has_aux=True)(carry.state)
+            frame, growth = orthonormal(elementwise_product(matrix, carry.frame))
+            after = TurnFrame(
+                made.state,
+                frame,
+                carry.logs + jnp.log(growth),
+                carry.impacts + made.impacts,
+                carry.turn + 1,
+                jnp.where(carry.code == 0, made.code, carry.code),
+            )
+            return after, after
+
+        return jax.lax.scan(turn, carry, None, length=TURNS)
+
+    return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, carry)
