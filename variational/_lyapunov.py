@@ -108,26 +108,10 @@ def lyapunov_spectrum(
     """
     inputs = system, state, values, t0, turn
     refuse_tracers("lyapunov_spectrum", "jax.jacfwd of jaxcam.hybrid.flow", *inputs)
-    switched = isinstance(system, SwitchedSystem)
-    if switched and np.any(np.asarray(system.hysteresis) != 0):
-        raise ValueError(
-            "lyapunov_spectrum does not support hysteresis, because the state at the "
-            "start of a period does not determine the side; differentiate "
-            "jaxcam.hybrid.flow over the whole motion with jax.jacfwd"
-        )
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()
-    if turn is None and system.period is None:
-        raise ValueError("this system has no forcing period; pass turn=... in seconds")
-    if not 2 <= blocks <= turns:
-        raise ValueError(
-            f"{turns} turns cannot be divided into {blocks} blocks; give at least two "
-            "blocks, and at least as many turns"
-        )
-    if (where is None) != (values is None):
-        raise ValueError(
-            "give where and values together, with one value for each motion"
-        )
+    _check(system, turns, turn, blocks, (where is None) == (values is None))
+    switched = isinstance(system, SwitchedSystem)
     system = as_arrays(system)
     settings = as_arrays(settings)
     state = real_array(state)
@@ -157,6 +141,28 @@ def lyapunov_spectrum(
     padded = _padded(states.shape[0])
     made = _in_turn(some, batched, states)
     return jax.tree.map(lambda leaf: leaf[0], made) if single else made
+
+
+def _check(system, turns: int, turn: float | None, blocks: int, paired: bool) -> None:
+    """Raise `ValueError` if the arguments do not fit together."""
+    if isinstance(system, SwitchedSystem):
+        if np.any(np.asarray(system.hysteresis) != 0):
+            raise ValueError(
+                "lyapunov_spectrum does not support hysteresis, because the state at "
+                "the start of a period does not determine the side; differentiate "
+                "jaxcam.hybrid.flow over the whole motion with jax.jacfwd"
+            )
+    if turn is None and system.period is None:
+        raise ValueError("this system has no forcing period; pass turn=... in seconds")
+    if not 2 <= blocks <= turns:
+        raise ValueError(
+            f"{turns} turns cannot be divided into {blocks} blocks; give at least two "
+            "blocks, and at least as many turns"
+        )
+    if not paired:
+        raise ValueError(
+            "give where and values together, with one value for each motion"
+        )
 
 
 def _by_steps(
