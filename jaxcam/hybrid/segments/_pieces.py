@@ -253,7 +253,8 @@ class _Engine:
             if bool(end.possible) and alone and t + length <= self.end:
                 kept = self.contact.copy()
                 kept[k] = True
-                self._close(k, before, JointEnd(t + length, end.state, kept))
+                rest = JointEnd(t + length, np.asarray(end.state), kept)
+                self._close(k, before, rest)
                 return
         self._row(RowKind.IMPACT, k, t, after, before)
 
@@ -261,7 +262,7 @@ class _Engine:
         """Log the last impact, on constraint `k`, and continue in contact."""
         self.contact = end.contact
         self._row(RowKind.LAST_IMPACT, k, self.t, self.x, before)
-        self.t, self.x = end.time, np.asarray(end.state)
+        self.t, self.x = end.time, end.state
         self._row(RowKind.CONTACT, k, self.t, self.x)
 
     def _no_step(self) -> float:
