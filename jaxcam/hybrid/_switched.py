@@ -25,7 +25,8 @@ class SwitchedSystem(HybridSystem):
     has impacts. `hysteresis` makes a surface switch like a relay, and `reset` makes the
     state jump at a crossing. If both branches point towards a surface, the motion
     slides along it until one of them points away; with dry friction, the body sticks.
-    `holding` is then the ratio of static to kinetic friction.
+    `holding` is then the ratio of static to kinetic friction. `friction` makes the
+    contact forces of constraints slip or stick (Coulomb).
 
     Examples:
         >>> from jaxcam.hybrid import SwitchedSystem
@@ -122,6 +123,32 @@ class SwitchedSystem(HybridSystem):
         the branches: at least one, a number or of shape `(k,)`; default: one.
         """
         return 1.0
+
+    def friction(
+        self, t: RealScalar, state: State, sides: Float[Array, " k"]
+    ) -> Float[Array, "*constraints n"]:
+        """Return the friction of each contact, per unit of its normal force: none by
+        default.
+
+        While a constraint is in contact, its force changes the rates of the state by
+        its multiple of the impulse direction plus this vector. For a body of
+        coefficient mu that slides along x, whose slip velocity is the first switching
+        function, only the rate of the velocity along x is not zero:
+        `-mu * sides[0]`. At zero slip the body sticks while the force that this takes
+        is less than mu times the normal force. `impact` is then the law without
+        friction: the impulse of friction, at most what stops the slip, is added to it.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+            sides: +1 or -1 for each surface, shape `(k,)`.
+
+        Returns:
+            Changes of the rates per unit of normal acceleration due to the contact,
+                shape `(n,)`, or `(m, n)` for m constraints.
+        """
+        del sides
+        return jnp.zeros((*jnp.shape(self.gap(t, state)), *state.shape))
 
     def reset(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]

@@ -1,23 +1,25 @@
-"""Find which components of a vector field change at each switching surface."""
+"""Find which components of the rates change at each switching surface."""
 
 from typing import no_type_check
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import Literal
 
 from .._switched import SwitchedSystem
 from ..lowering import scalarise, split
-from ..surface import surfaces
+from ..surface import has_friction, surfaces
 
 
 def jumping_components(
     system: SwitchedSystem, shapes, time, state, number: int
 ) -> tuple[tuple[int, ...], ...]:
-    """Return, for each surface, the components of the field that its side changes.
+    """Return, for each surface, the components of the rates that its side changes.
 
-    They are read from the program of the branches, scalar by scalar. A surface whose
+    These are those of the field and, in contact, those that friction changes. They are
+    read from the program of the branches, scalar by scalar. A surface whose
     switching function depends on none of these components has none: the motion moves
     towards it at the same speed on either side, so it cannot slide along it. An example
     is a stop at a position, which changes a force.
@@ -38,11 +40,18 @@ def jumping_components(
     def branch(p, t, x, sides):
         return eqx.combine(p, static).branch(t, x, sides)
 
+    def friction(p, t, x, sides):
+        rows = eqx.combine(p, static).friction(t, x, sides)
+        return jnp.sum(jnp.atleast_2d(rows), axis=0)
+
     def switching(p, t, x):
         return surfaces(eqx.combine(p, static), t, x)
 
     sides = jax.ShapeDtypeStruct((k,), np.float64)
     by_side = _dependence(branch, (shapes, time, state, sides), k)
+    if has_friction(system):
+        more = _dependence(friction, (shapes, time, state, sides), k)
+        by_side = [a | b for a, b in zip(by_side, more, strict=True)]
     by_state = _dependence(switching, (shapes, time, state), n)
     return tuple(
         tuple(changed) if set(changed) & by_state[surface] else ()

@@ -179,7 +179,9 @@ def first_state(
         struck=(-jnp.inf * one,) * m if m > 1 else (),
         crowded=(0.0 * one,) if m > 1 else (),
         crossed=(-jnp.inf * one,) if functions.k else (),
-        stale=(jnp.where(slides, 2.0, 0.0),) if functions.slidable else (),
+        stale=(jnp.where(slides, 2.0, jnp.where(held, 1.0, 0.0)),)
+        if functions.slidable
+        else (),
         origin=origin,
         extents=extents,
         ramp=first,

@@ -53,6 +53,7 @@ from ._sliding import (
     switched_rounding as switched_rounding,
 )
 from ._switches import (
+    has_friction as has_friction,
     OnSides as OnSides,
     resets as resets,
     surfaces as surfaces,

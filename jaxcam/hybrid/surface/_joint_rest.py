@@ -7,7 +7,12 @@ from jaxtyping import Array, Bool, Float
 from .._system import HybridSystem
 from .._types import RealScalar, State
 from ._masked import solve_masked
-from ._normal import gaps, normal_acceleration, normal_directions, normal_velocity
+from ._normal import (
+    contact_multipliers,
+    gaps,
+    normal_directions,
+    normal_velocity,
+)
 
 
 def joint_rest(
@@ -48,5 +53,4 @@ def joint_rest(
     lowered = heights @ lift
     speeds = normal_velocity(system, t, x) - slope @ lowered
     stopped = solve_masked(coupling, speeds, touching) @ push
-    multipliers = solve_masked(coupling, normal_acceleration(system, t, x), touching)
-    return x - lowered - stopped, multipliers
+    return x - lowered - stopped, contact_multipliers(system, t, x, touching)

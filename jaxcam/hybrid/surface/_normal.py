@@ -17,6 +17,7 @@ from jaxtyping import Array, Bool, Float
 from .._system import HybridSystem
 from .._types import RealScalar, State
 from ._masked import solve_masked
+from ._switches import friction_of, has_friction, sides_of, surfaces_of
 
 
 def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
@@ -40,7 +41,8 @@ def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
 
 
 def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"]:
-    """Return the state after an impact at each constraint, one row for each.
+    """Return the state after an impact at each constraint, one row for each; friction
+    included.
 
     Args:
         system: The system.
@@ -56,7 +58,33 @@ def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"
         >>> impacts(BouncingBall(), 0.0, jnp.array([0.0, -1.0])).tolist()
         [[0.0, 0.8]]
     """
-    return jnp.atleast_2d(system.impact(t, x))
+    after = jnp.atleast_2d(system.impact(t, x))
+    return with_friction(system, t, x, after) if has_friction(system) else after
+
+
+def with_friction(system, t, x, after: Float[Array, "m n"]) -> Float[Array, "m n"]:
+    """Add the impulses of friction to frictionless impacts.
+
+    Each is the friction of a contact times the impulse in the normal direction, but at
+    most what stops the slip (Coulomb's law; exact where the normal impulse does not
+    change the slip).
+    """
+    kicks = friction_of(system, t, x)
+    before = normal_velocity(system, t, x)
+
+    def slips(y):
+        return sides_of(system, t, x) * surfaces_of(system, t, y)
+
+    rows = []
+    for k in range(after.shape[0]):
+        impulse = normal_velocity(system, t, after[k])[k] - before[k]
+        kick = impulse * kicks[k]
+        at_first, at_last = slips(after[k]), slips(after[k] + kick)
+        reverses = at_last < 0
+        change = jnp.where(reverses, at_first - at_last, 1.0)
+        share = jnp.where(reverses, jnp.maximum(at_first, 0.0) / change, 1.0)
+        rows.append(after[k] + jnp.min(share) * kick)
+    return jnp.stack(rows)
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:
@@ -168,24 +196,35 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
     rows = []
     for k in range(number):
         _, moved = jax.jvp(
-            lambda y, k=k: impacts(system, t, y)[k] - y, (x,), (gradient[k],)
+            lambda y, k=k: jnp.atleast_2d(system.impact(t, y))[k] - y,
+            (x,),
+            (gradient[k],),
         )
         # only the direction matters, because its length is fixed by v_x D = 1
         rows.append(moved / jnp.sum(gradient[k] * moved))
     return jnp.stack(rows)
 
 
-def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
-    """Return q with F_s = F - sum q_k D_k over the constraints in contact.
+def force_directions(system, t, x) -> Float[Array, "m n"]:
+    """Return the changes of the rates by unit contact forces, friction included."""
+    directions = normal_directions(system, t, x)
+    if not has_friction(system):
+        return directions
+    return directions + friction_of(system, t, x)
 
-    With one constraint, q = a. The contact force is compressive while q < 0, and the
-    contact ends when q rises through zero. For constraints that are not in
-    contact, q is zero.
+
+def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
+    """Return q with F_s = F - sum q_k D_k over the constraints in contact, where the
+    D_k include friction.
+
+    With one constraint without friction, q = a. The contact force is compressive while
+    q < 0, and the contact ends when q rises through zero. For constraints that are not
+    in contact, q is zero.
     """
     acceleration = normal_acceleration(system, t, x)
-    if acceleration.shape[0] == 1:
+    if acceleration.shape[0] == 1 and not has_friction(system):
         return jnp.where(contact, acceleration, jnp.zeros_like(acceleration))
-    directions = normal_directions(system, t, x)
+    directions = force_directions(system, t, x)
     gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     return solve_masked(gradient @ directions.T, acceleration, contact)
 
@@ -212,7 +251,7 @@ def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
     if not contact.shape[0]:
         return system.vector_field(t, x)
     multipliers = contact_multipliers(system, t, x, contact)
-    directions = normal_directions(system, t, x)
+    directions = force_directions(system, t, x)
     push = jnp.sum(multipliers[:, None] * directions, axis=0)
     return system.vector_field(t, x) - push
 
