@@ -132,7 +132,7 @@ def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
         for bound, side in ((parameter.lower, "lower"), (parameter.upper, "upper")):
             if np.any(np.abs(column - bound) <= near):
                 found.append(
-                    f"{name} is at its {side} bound {bound:g}, where its error is "
-                    f"meaningless; widen the bound or fix the parameter."
+                    f"{name} is at its {side} bound {bound:g}, where its standard "
+                    f"error is meaningless; widen the bound or fix the parameter."
                 )
     return found
