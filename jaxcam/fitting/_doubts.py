@@ -82,8 +82,8 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
     joints, kind = np.asarray(costs.joints), np.asarray(pieces.joint)
     flown, rested = np.asarray(costs.flown), np.nan_to_num(np.asarray(costs.rested))
     size = problem.start.states.shape[-1]
-    sampled = "pieces, the cost per sample"
-    joined = "joints, the cost per component"
+    sampled = "pieces into which the recordings are divided, the cost per sample"
+    joined = "joints between consecutive pieces, the cost per component"
     within, impact = used & (kind == FLIGHT), used & (kind == IMPACT)
     parts = (
         (
