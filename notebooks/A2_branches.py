@@ -10,8 +10,8 @@
 #
 # A forced oscillator hits a wall once per forcing period. We find this periodic orbit,
 # compute its stability, and follow it as the wall moves. The orbit appears at a fold,
-# loses its stability at a flip, and ends at a grazing. (A callback ends the branch at
-# the grazing. Without it, continuation proceeds with the orbit that has one more
+# loses its stability at a flip, and ends at a grazing bifurcation. (A callback ends the
+# branch there. Without it, continuation proceeds with the orbit that has one more
 # impact.)
 
 # +

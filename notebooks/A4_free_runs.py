@@ -121,10 +121,10 @@ for label, more in steps.items():
     values |= fitted.values
 # -
 
-# Free runs of the second recording deviate from it because its friction is larger from
-# the start, even before the first pulse: at the same position and speed, the motor
-# force is larger in both directions. No model fitted to the first recording can
-# predict this.
+# Free-run predictions of the second recording deviate from it because its friction is
+# larger from the start, even before the first pulse: at the same position and speed,
+# the motor force is larger in both directions. No model fitted to the first recording
+# can predict this.
 
 # +
 rate = np.gradient(estimation["position_m"], estimation.time)

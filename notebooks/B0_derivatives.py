@@ -31,7 +31,7 @@ from jaxcam.plotting import style, time_history
 # ## Through one impact, and through chatter
 #
 # A ball falls from a height of one metre, bounces ever more rapidly, and comes to rest
-# after a finite time. A larger gravity makes the first impact earlier and faster, and
+# after a finite time. Stronger gravity makes the first impact earlier and faster, and
 # both effects change the height at 0.7 s. `jax.jacfwd` of `simulate` includes both,
 # because it also differentiates the time of the impact. With $t_1 = \sqrt{2h/g}$ and
 # the coefficient of restitution $r$,
@@ -67,7 +67,7 @@ ball = jnp.array([9.81, 0.8])
 forward = jax.jit(jax.jacfwd(outcome))(ball)
 exact = jax.jacfwd(by_formula)(ball)
 print("d height / d (gravity, restitution):", forward[0], "formula:", exact[0])
-print("d rest / d (gravity, restitution):  ", forward[1], "formula:", exact[1])
+print("d time of rest / d (gravity, restitution):", forward[1], "formula:", exact[1])
 assert jnp.allclose(forward, exact, rtol=1e-9)
 # -
 

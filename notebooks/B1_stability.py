@@ -6,12 +6,12 @@
 #       format_name: light
 # ---
 
-# # B1. Stability: saltation, multipliers, and curves of bifurcations
+# # B1. Stability: saltation, multipliers, and bifurcation curves
 #
-# Notebook A2 follows one branch and finds a fold, a flip and a grazing on it. Here we
-# examine how a small perturbation changes at an impact and over one period, and where
-# in the plane of two parameters the orbit exists and is stable. (Notebook B2 studies
-# the cam-follower.)
+# Notebook A2 follows one branch and finds a fold, a flip and a grazing bifurcation on
+# it. Here we examine how a small perturbation changes at an impact and over one period,
+# and where in the plane of two parameters the orbit exists and is stable. (Notebook B2
+# studies the cam-follower.)
 
 # +
 import jax.numpy as jnp
@@ -54,8 +54,9 @@ np.testing.assert_allclose(
 )
 # -
 
-# The package computes this matrix in two ways: as a product of such factors, or by
-# differentiating the event loop. The two methods have no formula in common.
+# The package computes the monodromy matrix in two ways: as a product of saltation
+# matrices and flight derivatives, or by differentiating the event loop. The two methods
+# have no formula in common.
 
 product = variational.monodromy(system, orbit, method="product")
 differentiated = variational.monodromy(system, orbit, method="flow")

@@ -10,9 +10,8 @@
 #
 # From one initial state, an oscillator settles to an orbit with one impact per period.
 # From another initial state nearby, it settles to an orbit with six impacts in six
-# periods. Which
-# initial states lead to which orbit? And how well can this be predicted if the basin
-# boundary is as finely folded as here?
+# periods. Which initial states lead to which orbit? And how well can this be predicted
+# if the basin boundary is as finely folded as here?
 
 # +
 import matplotlib.pyplot as plt
@@ -59,7 +58,7 @@ for ax, name, points in zip(panels, found.names, found.orbits, strict=True):
     orbit = continuation.periodic_orbit(system, points[0], periods=turns)
     size = abs(orbit.multipliers).max()
     turns_to_settle = -turns / np.log(size)
-    print(f"{name}: |mu| = {size:.6f}, {turns_to_settle:.0f} periods for a factor e")
+    print(f"{name}: |mu| = {size:.6f}, time constant {turns_to_settle:.0f} periods")
     assert size < 1
     run = jaxcam.simulate(system, orbit.state, orbit.time, orbit.time + orbit.period)
     phase_portrait(run, ax)

@@ -38,7 +38,7 @@ from jaxcam.recordings import read_case, read_rig, segment_case
 
 
 class Hinged(HybridSystem):
-    """The cam-follower with a viscous hinge."""
+    """The cam-follower with viscous friction in the hinge."""
 
     rig: CamFollower
     damping: float = 0.0  # 1/s

@@ -25,7 +25,8 @@ class WithoutStop(HybridSystem):
 
 
 class Pendulum(WithoutStop):
-    """A rigid pendulum with a viscous hinge: angle from the vertical, and its rate."""
+    """A rigid pendulum with viscous friction in the hinge: angle from the vertical, and
+    its rate."""
 
     stiffness: float = 60.0
     damping: float = 0.05

@@ -137,6 +137,6 @@ def _closed_up(
         tangent,
         reason=(
             f"continued with {count} impacts; between here and the interruption lie "
-            "infinitely many grazings, each with one more impact"
+            "infinitely many grazing bifurcations, each with one more impact"
         ),
     )

@@ -42,11 +42,12 @@ _STEPS = 64
 class StickingOrbits(AbstractProblem):
     """Orbits P(inf, n), which leave contact, chatter and stick once in n periods.
 
-    While it sticks, it follows the constraint, so its state at release is independent
-    of the past: it is given by the time t and the state x at which gap, normal velocity
-    and normal acceleration are zero. These are the equations; the unknowns, shape
-    `(3,)`, are the phase of release (time in forcing periods) and the state there. All
-    multipliers are zero. Two monitors determine where the orbit exists:
+    While the system sticks, it follows the constraint, so its state at release is
+    independent of the past: it is given by the time t and the state x at which gap,
+    normal velocity and normal acceleration are zero. These are the equations; the
+    unknowns, shape `(3,)`, are the phase of release (time in forcing periods) and the
+    state there. All multipliers are zero. Two monitors determine where the orbit
+    exists:
 
     - the margin of [`variational.chatter_accumulation`][], which is zero if the impacts
         accumulate exactly at the n-th release. There, the sticking time itself falls to

@@ -28,8 +28,8 @@ def fit(
             "--json",
             metavar="FILE",
             help=(
-                "Write the fitted system and its errors, for use as --system; - "
-                "prints them."
+                "Write the fitted system and its standard errors, for use as "
+                "--system; - prints them."
             ),
         ),
     ] = None,

@@ -3,8 +3,9 @@
     python -m jaxcam.data.make_demo
 
 The rig is simulated here with a scalar Runge-Kutta loop that is independent of
-`jaxcam.hybrid`, so that the comparison is meaningful. The rig has a viscous hinge,
-which the textbook model lacks, a drive whose speed wanders, and encoders with noise.
+`jaxcam.hybrid`, so that the comparison is meaningful. The rig has viscous friction in
+the hinge, which the textbook model lacks, a drive whose speed wanders, and encoders
+with noise.
 """
 
 import dataclasses

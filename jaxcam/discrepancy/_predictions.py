@@ -27,7 +27,7 @@ class Prediction:
 
     `before` and `after` are the predictions of the refitted textbook model without and
     with the missing effects. Their standard errors follow from those of the fits. A
-    prediction and its error are NaN if there is no such speed.
+    prediction and its standard error are NaN if there is no such speed.
 
     Examples:
         >>> from jaxcam.discrepancy import Prediction
@@ -56,10 +56,10 @@ def predictions(
     models.
 
     These are the speeds of valve float, of the fold and the flip of P(1,1), and of the
-    interruption of complete chatter. Their errors are estimated from random rigs, drawn
-    from the distribution of the fitted parameters. The second model includes the named
-    terms except those with a frequency of their own, because the motion is then not
-    periodic with the cam.
+    interruption of complete chatter. Their standard errors are estimated from random
+    rigs, drawn from the distribution of the fitted parameters. The second model
+    includes the named terms except those with a frequency of their own, because the
+    motion is then not periodic with the cam.
 
     Args:
         found: The diagnosis.

@@ -128,14 +128,14 @@ class Policy:
         4, "sections per recording in that test; the worst one is ignored"
     )
     velocity_tail: float = _decides(
-        0.005, "share of the velocities beyond each end of a free function of velocity"
+        0.005, "share of the velocities beyond each end of a velocity function's range"
     )
     drive_wander: float = _decides(
         0.75,
         "multiple of the drive's frequency below which its variations are speed drift",
     )
     drive_degree: int = _decides(
-        5, "degree of the polynomial for the speed drift near the ends"
+        5, "degree of the polynomial for speed drift near the ends of a recording"
     )
     drive_orders: tuple[float, ...] = _decides(
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),
@@ -227,13 +227,14 @@ class Policy:
         3, "maximum number of free functions and terms fitted per stage"
     )
     outdone: float = _bounds(1.25, "multiple of the curve's cost that a form must beat")
-    enough: float = _bounds(0.1, "share of the tolerated residual that ends the search")
+    enough: float = _bounds(
+        0.1, "share of the tolerated residual below which the search ends"
+    )
     heats: int = _bounds(
         4, "maximum number of fits of a free function until its prior converges"
     )
     recentred: int = _bounds(
-        12,
-        "maximum number of additional fits for the parameters of an element",
+        12, "maximum number of additional fits for the parameters of an element"
     )
     heated: float = _bounds(
         1.5, "ratio of consecutive costs below which the prior has converged"

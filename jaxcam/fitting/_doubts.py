@@ -82,8 +82,8 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
     joints, kind = np.asarray(costs.joints), np.asarray(pieces.joint)
     flown, rested = np.asarray(costs.flown), np.nan_to_num(np.asarray(costs.rested))
     size = problem.start.states.shape[-1]
-    sampled = "pieces, the cost per sample"
-    joined = "joints, the cost per component"
+    sampled = "pieces into which the recordings are divided, the cost per sample"
+    joined = "joints between consecutive pieces, the cost per component"
     within, impact = used & (kind == FLIGHT), used & (kind == IMPACT)
     parts = (
         (
@@ -132,7 +132,7 @@ def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
         for bound, side in ((parameter.lower, "lower"), (parameter.upper, "upper")):
             if np.any(np.abs(column - bound) <= near):
                 found.append(
-                    f"{name} is at its {side} bound {bound:g}, where its error is "
-                    f"meaningless; widen the bound or fix the parameter."
+                    f"{name} is at its {side} bound {bound:g}, where its standard "
+                    f"error is meaningless; widen the bound or fix the parameter."
                 )
     return found

@@ -80,8 +80,8 @@ def fit(
 
     Returns:
         A [`jaxcam.fitting.Fit`][]. It has `converged` only if it is at an optimum away
-            from all bounds, the noise explains the residuals, and every error is
-            finite; otherwise, `reasons` explains why not.
+            from all bounds, the noise explains the residuals, and every standard error
+            is finite; otherwise, `reasons` explains why not.
 
     Raises:
         ValueError: A name is not a parameter.

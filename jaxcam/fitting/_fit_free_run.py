@@ -53,10 +53,10 @@ def fit_free_run(
     """Fit parameters to complete free runs.
 
     `fit` compares each piece of a recording with a prediction from the piece before,
-    and estimates the error of each parameter. This function minimises the error of a
-    simulation that starts at the first samples. A model discrepancy accumulates in the
-    simulation and biases the parameters, so no errors are given. Channels are weighted
-    by the inverse of their noise.
+    and estimates the standard error of each parameter. This function minimises the
+    error of a simulation that starts at the first samples. A model discrepancy
+    accumulates in the simulation and biases the parameters, so no standard errors are
+    given. Channels are weighted by the inverse of their noise.
 
     Args:
         model: A system with its sensors and its input.

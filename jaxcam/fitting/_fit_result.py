@@ -145,7 +145,7 @@ class Fit:
         """Return whether the fit is at an optimum with residuals that the noise
         explains.
 
-        All errors are then finite; otherwise, `reasons` explains why not.
+        All standard errors are then finite; otherwise, `reasons` explains why not.
         """
         return not self.reasons
 

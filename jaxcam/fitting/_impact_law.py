@@ -51,10 +51,11 @@ class ImpactLaw:
     """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
     """BIC of each law minus that of the constant law; negative is better. A power law
-    that the impacts do not support is the constant law with one extra parameter.
+    in the direction that the impacts do not show counts as a constant law with one
+    extra parameter.
     """
     p_value: float
-    """Probability of such a gain of the power law if the coefficient is constant."""
+    """p-value of the F test of the power law against a constant coefficient."""
     scatter: float
     """Standard deviation of single impacts, in `scatter_unit`."""
     scatter_unit: str
@@ -109,7 +110,9 @@ class ImpactLaw:
     def _caveats(self) -> list[str]:
         table, found = self.table, list(self.table.notes)
         if self.scatter_unit == "stated":
-            found.append(f"The scatter is {self.scatter:.2g} times the stated errors.")
+            found.append(
+                f"The scatter is {self.scatter:.2g} times the stated standard errors."
+            )
         elif self.scatter_unit == "1":
             found.append(
                 f"The coefficient of restitution scatters by {self.scatter:.2g}."
@@ -163,12 +166,11 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     """Return the restitution law that a table of impacts supports.
 
     A constant coefficient of restitution and a power law, r = r0 (1 + v / v_ref)^-b
-    with the median speed as v_ref, are fitted by least squares. The scatter of single
-    impacts is estimated: it is constant either in the speed or in the coefficient of
-    restitution, whichever is more likely; if the table contains errors, it is
-    proportional to them. The power law is chosen if, according to an F test, it would
-    gain as much by chance in at most one of a hundred tables with a constant
-    coefficient.
+    with the median speed as v_ref, are fitted by least squares. The standard deviation
+    of single impacts is estimated: that of the speed or that of the coefficient of
+    restitution is assumed to be constant, whichever is more likely; if the table states
+    standard errors, it is proportional to these. The power law is chosen if an F test
+    rejects a constant coefficient at the 1 % level.
 
     Args:
         table: The impacts.
@@ -190,7 +192,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     if len(table) < _LEAST:
         raise RecordingError(
             f"{table.name}: there are only {len(table)} impacts; at least {_LEAST} are "
-            f"needed for a law and its error."
+            f"needed for a law and its standard error."
         )
     weights = _weights(table)
     every = np.ones(len(table), dtype=bool)

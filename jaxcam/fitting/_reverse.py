@@ -79,9 +79,9 @@ def train(
 ) -> Trained:
     """Fit a part of a model with very many parameters, such as a neural network.
 
-    The method is L-BFGS (scipy) with reverse-mode gradients. At each step, the states
-    of the pieces are fitted first, so the gradient is that of the cost minimised over
-    the states.
+    The method is L-BFGS (scipy) with reverse-mode gradients. At each step, the initial
+    states of the pieces into which the recordings are divided (multiple shooting) are
+    fitted first, so the gradient is that of the cost minimised over the states.
 
     Args:
         problem: The problem.

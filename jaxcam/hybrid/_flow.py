@@ -52,10 +52,10 @@ def flow(
     The function is pure: it can be compiled (`jit`), batched (`vmap`) and
     differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
     parameters. A gradient costs one forward derivative per differentiation variable.
-    The numbers of impacts, contacts and releases may differ between batch elements. For
-    an invalid start (behind a constraint, not finite, t1 before t0), the result has a
-    specific code and the state NaN; outside of transformations, the system is checked
-    first.
+    The numbers of impacts, contacts and releases may differ between batch elements. If
+    the start is invalid (a negative gap, a state that is not finite, or t1 < t0),
+    `code` gives the reason and the final state is NaN. Outside of transformations, the
+    system is checked first.
 
     Args:
         system: The system to simulate.

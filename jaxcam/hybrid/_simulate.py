@@ -87,8 +87,8 @@ def simulate(
         A trajectory. If it did not reach t1, its `result` gives the reason.
 
     Raises:
-        ValueError: The state is not finite or lies behind a constraint, t1 < t0, a
-            setting is out of range, or a function of the system has the wrong shape.
+        ValueError: The state is not finite or a gap is negative, t1 < t0, a setting is
+            out of range, or a function of the system has the wrong shape.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

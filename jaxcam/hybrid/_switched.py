@@ -18,8 +18,8 @@ class SwitchedSystem(HybridSystem):
     state for given sides of the surfaces, +1 where the function is positive and -1
     where it is negative. Each branch must remain smooth slightly beyond its surfaces.
     The event loop locates a crossing as accurately as an impact, ends the step there
-    and continues with the other branch. A stiffness with a corner, backlash or a relay
-    therefore causes no loss of accuracy, and crossings have exact derivatives.
+    and continues with the other branch. A spring force with a corner, backlash or a
+    relay therefore causes no loss of accuracy, and crossings have exact derivatives.
 
     There are no constraints by default; define `gap` and `impact` if the system also
     has impacts. `hysteresis` makes a surface switch like a relay, and `reset` makes the

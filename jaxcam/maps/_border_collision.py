@@ -73,7 +73,7 @@ def classify_border_collision(left, right) -> BorderCollision:
 def border_collision(
     system: PiecewiseMap, where: Callable, guess, state=0.0
 ) -> BorderCollision:
-    """Locate and classify the border collision of a fixed point of the left rule.
+    """Locate and classify the border collision of a fixed point with x <= 0.
 
     Args:
         system: A continuous map.
@@ -103,7 +103,7 @@ def border_collision(
     residual, _ = _residual(system, where, unknown)
     if not float(jnp.max(jnp.abs(residual))) < 1e-10:
         raise ValueError(
-            "No fixed point of the left rule reaches the border near this guess; give "
+            "No fixed point with x <= 0 reaches the border near this guess; give "
             "another `guess`."
         )
     moved = eqx.tree_at(where, system, parameter)

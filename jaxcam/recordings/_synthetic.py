@@ -112,7 +112,8 @@ def record(
     """Simulate a system and record it with sensors.
 
     Args:
-        system: The system; a driven one may be a `Wandering`.
+        system: The system; to simulate drift of the drive speed, wrap it in
+            `jaxcam.recordings.Wandering`.
         sensors: A `jaxcam.fitting.Sensor` for each channel.
         duration: Length of the recording (s).
         rng: Random number generator for the noise.

@@ -40,7 +40,7 @@ def basins(
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.
-        grid: A [`jaxcam.sweeps.Grid`][] of initial states; those behind a constraint
+        grid: A [`jaxcam.sweeps.Grid`][] of initial states; those with a negative gap
             are omitted.
         turns: Number of periods simulated.
         keep: Number of final samples used; periods up to `keep / 2` are detected.

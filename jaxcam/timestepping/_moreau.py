@@ -63,8 +63,8 @@ def moreau(
     """Simulate from `t0` to `t1` in `steps` time steps without event detection
     (Moreau).
 
-    Each step integrates free flight by the midpoint rule. If it ends behind a
-    constraint, the velocities jump at mid-step according to a complementarity
+    Each step integrates free flight by the midpoint rule. If it ends with a constraint
+    violated, the velocities jump at mid-step according to a complementarity
     condition: each normal velocity at the end is at least that of the impact law, never
     negative, and larger only if no impulse acts (after J. J. Moreau, Unilateral
     contact and dry friction in finite freedom dynamics, 1988). Impacts, simultaneous

@@ -44,11 +44,16 @@ _LINEAR = 1e-8
 
 
 class ComposedMap(eqx.Module):
-    """Local theory of one period around the interruption of complete chatter."""
+    """Local theory of one period around the interruption of complete chatter.
+
+    D* is an impact of the chatter sequence, lambda its dimensionless rebound speed, and
+    epsilon the velocity relative to the surface at release divided by the rate of the
+    relative acceleration.
+    """
 
     frame: ChatterFrame
-    """The frame whose release is between the sections at the start and end of the
-    period.
+    """Release point between the sections at the start and the end of the period,
+    and scales of the chatter that ends there.
     """
     section: Float[Array, ""]
     """Time of the section at the end of the period (s)."""
@@ -63,7 +68,7 @@ class ComposedMap(eqx.Module):
     lam: Float[Array, ""]
     """Lambda of D*."""
     lambda_bar: Float[Array, ""]
-    """Fixed point of the lambda-map."""
+    """Fixed point of the map from the lambda of an impact to that of the next."""
     matrix: Float[Array, "2 2"]
     """A: derivatives of rebound speed and time of D* with respect to the state at the
     section, shape `(2, 2)` (thesis, eq. 6.107).

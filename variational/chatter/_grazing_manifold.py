@@ -60,7 +60,7 @@ def grazing_manifold(
 
     Returns:
         A [`variational.chatter.GrazingManifold`][]; times are not reduced modulo the
-            period. A point of S^k whose flight would have started behind the constraint
+            period. A point of S^k whose flight would have started inside the constraint
             is NaN.
 
     Raises:

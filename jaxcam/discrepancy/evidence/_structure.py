@@ -53,7 +53,7 @@ class Structure:
     sentence: str
     """The structure in words."""
     where: str
-    """Place at which it acts."""
+    """Part of the model in which it acts, such as flight, impact or sensor."""
     region: str
     """Part of the motion, in words."""
     gain: float

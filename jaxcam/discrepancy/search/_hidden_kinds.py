@@ -90,7 +90,8 @@ def _relaxations(driven: Driven, cells):
 
 
 def _hystereses(driven: Driven, cells, loading: int = 1):
-    return list(zip(*hysteresis_signals(driven, *np.array(cells).T, loading)))
+    limits, betas, powers = np.array(cells).T
+    return list(zip(*hysteresis_signals(driven, limits, betas, powers, loading)))
 
 
 RESONANCE = Kind(

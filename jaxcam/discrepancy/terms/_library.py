@@ -221,10 +221,10 @@ class StribeckFriction(Term):
 
 
 class AsymmetricFriction(Term):
-    """Dry friction that acts in one direction only."""
+    """Dry friction that acts in one direction of motion only."""
 
     name: ClassVar[str] = "asymmetric_friction"
-    sentence: ClassVar[str] = "friction that acts in one direction only"
+    sentence: ClassVar[str] = "friction that acts in one direction of motion only"
     region: ClassVar[str] = "in flight, at positive velocities"
     source: ClassVar[str] = "Armstrong-Helouvry 1991, Control of Machines with Friction"
     listed: ClassVar[bool] = False

@@ -159,7 +159,7 @@ class Term(eqx.Module):
     corner: ClassVar[bool] = False
     """Whether its force jumps, like dry friction, and is smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
-    """Places at which it acts."""
+    """Parts of the model in which it acts."""
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
     """Index of the coordinate on which the force acts and whose position and velocity
     the term uses.

@@ -4,7 +4,7 @@ import enum
 
 
 class Where(enum.StrEnum):
-    """The place where an effect acts; equal to its name as a string."""
+    """The part of the model in which an effect acts; equal to its name as a string."""
 
     FLIGHT = "flight"
     IMPACT = "impact"

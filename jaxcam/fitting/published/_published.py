@@ -98,7 +98,7 @@ def fit_published(
 ) -> PublishedFit:
     """Fit parameters of a model to published numbers.
 
-    The method is Levenberg-Marquardt (MINPACK), in stages of decreasing errors.
+    The method is Levenberg-Marquardt, in stages of decreasing standard errors.
 
     Args:
         model: A system, or a module that contains one, at the nominal values.
@@ -107,7 +107,7 @@ def fit_published(
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
         start: Initial values; default: the nominal values.
-        max_steps: Maximum number of evaluations for each scale of the errors.
+        max_steps: Maximum number of evaluations in each stage.
         progress: Called after each evaluation with its number and the cost.
 
     Returns:
