@@ -16,6 +16,7 @@ from ._dry_friction_oscillator import DryFrictionOscillator as DryFrictionOscill
 from ._forced_oscillator import ForcedOscillator as ForcedOscillator
 from ._gear_backlash import GearBacklash as GearBacklash
 from ._impact_oscillator import ImpactOscillator as ImpactOscillator
+from ._inclined_shaker import InclinedShaker as InclinedShaker
 from ._piecewise_linear import (
     PiecewiseLinear as PiecewiseLinear,
     planar_stability as planar_stability,
@@ -27,6 +28,7 @@ from ._restitution import (
     LinearInSpeed as LinearInSpeed,
     PowerLawRestitution as PowerLawRestitution,
 )
+from ._spinning_ball import SpinningBall as SpinningBall
 from ._through_joints import simulate_through_joints as simulate_through_joints
 from ._triple_integrator import TripleIntegrator as TripleIntegrator
 from ._units import rad_s_to_rpm as rad_s_to_rpm, rpm_to_rad_s as rpm_to_rad_s

@@ -72,6 +72,7 @@ def _iterate(
     made = make_step(functions, plan, carried, end)
     if carried.stale:
         carried = seen_again(carried, made.jets)
+        made = made._replace(jets=_of_constraints(carried, carried.jets, made.jets))
     judged = _judge_flights(plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
     landing = land(functions, plan, carried, end, made, lands, flown, rounding)
@@ -277,6 +278,16 @@ def _stale(carried, landing: Landing, released) -> tuple:
     return (jnp.where(landing.slides, 2.0, jnp.where(released, 1.0, 0.0)),)
 
 
+def _of_constraints(carried: LoopState, old, new) -> list:
+    """Return new jets, but the old ones of constraints in a step of length zero.
+
+    It only evaluates the jets of surfaces again: rounding must not undo a release.
+    """
+    again, m = carried.stale[0] > 0, len(carried.held)
+    kept = zip(old[:m], new[:m], strict=True)
+    return [*(Jet(*select(again, a, b)) for a, b in kept), *new[m:]]
+
+
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
     """Return the jets of the next step, in which rounding must not undo a contact.
 
@@ -308,6 +319,11 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
                 jnp.where(ends, chatter.rate, jet.jerk),
             )
         )
+    if carried.stale:
+        same = _of_constraints(carried, carried.jets, after)
+        after = [
+            Jet(*select(landing.strikes, new, old)) for new, old in zip(after, same)
+        ]
     return tuple(after)
 
 
