@@ -25,8 +25,8 @@ class SwitchedSystem(HybridSystem):
     has impacts. `hysteresis` makes a surface switch like a relay, and `reset` makes the
     state jump at a crossing. If both branches point towards a surface, the motion
     slides along it until one of them points away; with dry friction, the body sticks.
-    `holding` is then the ratio of static to kinetic friction. `friction` makes the
-    contact forces of constraints slip or stick (Coulomb).
+    `holding` is then the ratio of static to kinetic friction. `contact_friction` adds
+    Coulomb friction to constraints.
 
     Examples:
         >>> from jaxcam.hybrid import SwitchedSystem
@@ -124,7 +124,7 @@ class SwitchedSystem(HybridSystem):
         """
         return 1.0
 
-    def friction(
+    def contact_friction(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]
     ) -> Float[Array, "*constraints n"]:
         """Return the friction of each contact, per unit of its normal force: none by

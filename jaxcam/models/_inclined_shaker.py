@@ -76,7 +76,7 @@ class InclinedShaker(SwitchedSystem):
         up = push * jnp.sin(self.direction) - self.gravity * jnp.cos(self.incline)
         return jnp.stack([state[2], state[3], along, up])
 
-    def friction(self, t, state, sides) -> jax.Array:
+    def contact_friction(self, t, state, sides) -> jax.Array:
         """Return the friction per unit of the normal force, shape `(4,)`."""
         del t
         return jnp.zeros_like(state).at[2].set(-self.friction_coefficient * sides[0])

@@ -68,7 +68,7 @@ class SpinningBall(SwitchedSystem):
         zero = 0.0 * state[0]
         return jnp.stack([state[2], state[3], zero, zero - self.gravity, zero])
 
-    def friction(self, t, state, sides) -> jax.Array:
+    def contact_friction(self, t, state, sides) -> jax.Array:
         """Return the friction per unit of the normal force, shape `(5,)`."""
         del t
         push = -self.friction_coefficient * sides[0]

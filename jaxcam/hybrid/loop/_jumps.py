@@ -41,7 +41,7 @@ def jumping_components(
         return eqx.combine(p, static).branch(t, x, sides)
 
     def friction(p, t, x, sides):
-        rows = eqx.combine(p, static).friction(t, x, sides)
+        rows = eqx.combine(p, static).contact_friction(t, x, sides)
         return jnp.sum(jnp.atleast_2d(rows), axis=0)
 
     def switching(p, t, x):

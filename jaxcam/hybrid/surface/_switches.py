@@ -73,7 +73,7 @@ def has_friction(system: HybridSystem) -> bool:
     switched = system.system if isinstance(system, OnSides) else system
     if not isinstance(switched, SwitchedSystem):
         return False
-    return type(switched).friction is not SwitchedSystem.friction
+    return type(switched).contact_friction is not SwitchedSystem.contact_friction
 
 
 def sides_of(system: HybridSystem, t, x) -> Float[Array, " k"]:
@@ -94,7 +94,7 @@ def friction_of(system: HybridSystem, t, x) -> Float[Array, "m n"]:
     of the motion.
     """
     switched: Any = system.system if isinstance(system, OnSides) else system
-    return jnp.atleast_2d(switched.friction(t, x, sides_of(system, t, x)))
+    return jnp.atleast_2d(switched.contact_friction(t, x, sides_of(system, t, x)))
 
 
 def resets(mode: OnSides, t, x) -> Float[Array, "k n"]:
