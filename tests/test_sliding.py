@@ -353,6 +353,8 @@ def test_two_masses_stick_and_let_go_one_after_the_other():
     st.floats(-1.5, 1.5),
 )
 def test_energy_falls_and_a_stuck_body_rests(x, v, friction, static, wall):
+    # no step is short enough for a velocity near the smallest number
+    v = v if abs(v) > 1e-300 else 0.0
     system = Rubbing(friction=friction, static=static)
     run = jaxcam.simulate(system, [x, v], 0.0, 25.0)
     assert run.successful
