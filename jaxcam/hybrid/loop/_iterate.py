@@ -71,8 +71,7 @@ def _iterate(
     end = end_of_step(plan, carried, rounding)
     made = make_step(functions, plan, carried, end)
     if carried.stale:
-        carried = seen_again(carried, made.jets)
-        made = made._replace(jets=_of_constraints(carried, carried.jets, made.jets))
+        carried, made = _seen_again(carried, made)
     judged = _judge_flights(plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
     landing = land(functions, plan, carried, end, made, lands, flown, rounding)
@@ -276,6 +275,13 @@ def _stale(carried, landing: Landing, released) -> tuple:
     if not carried.stale:
         return ()
     return (jnp.where(landing.slides, 2.0, jnp.where(released, 1.0, 0.0)),)
+
+
+def _seen_again(carried: LoopState, made: Step) -> tuple[LoopState, Step]:
+    """Return a state whose mode has just changed, and its step, with fitting jets."""
+    carried = seen_again(carried, made.jets)
+    jets = _of_constraints(carried, carried.jets, made.jets)
+    return carried, made._replace(jets=jets)
 
 
 def _of_constraints(carried: LoopState, old, new) -> list:

@@ -9,6 +9,7 @@ from ._chatter import (
     completion_coefficients as completion_coefficients,
     completion_time as completion_time,
 )
+from ._contact_friction import has_friction as has_friction
 from ._impact_law import (
     check_restitution as check_restitution,
     restitutions as restitutions,
@@ -53,7 +54,6 @@ from ._sliding import (
     switched_rounding as switched_rounding,
 )
 from ._switches import (
-    has_friction as has_friction,
     OnSides as OnSides,
     resets as resets,
     surfaces as surfaces,

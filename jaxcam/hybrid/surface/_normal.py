@@ -16,8 +16,8 @@ from jaxtyping import Array, Bool, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
+from ._contact_friction import friction_of, has_friction, with_friction
 from ._masked import solve_masked
-from ._switches import friction_of, has_friction, sides_of, surfaces_of
 
 
 def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
@@ -59,32 +59,9 @@ def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"
         [[0.0, 0.8]]
     """
     after = jnp.atleast_2d(system.impact(t, x))
-    return with_friction(system, t, x, after) if has_friction(system) else after
-
-
-def with_friction(system, t, x, after: Float[Array, "m n"]) -> Float[Array, "m n"]:
-    """Add the impulses of friction to frictionless impacts.
-
-    Each is the friction of a contact times the impulse in the normal direction, but at
-    most what stops the slip (Coulomb's law; exact where the normal impulse does not
-    change the slip).
-    """
-    kicks = friction_of(system, t, x)
-    before = normal_velocity(system, t, x)
-
-    def slips(y):
-        return sides_of(system, t, x) * surfaces_of(system, t, y)
-
-    rows = []
-    for k in range(after.shape[0]):
-        impulse = normal_velocity(system, t, after[k])[k] - before[k]
-        kick = impulse * kicks[k]
-        at_first, at_last = slips(after[k]), slips(after[k] + kick)
-        reverses = at_last < 0
-        change = jnp.where(reverses, at_first - at_last, 1.0)
-        share = jnp.where(reverses, jnp.maximum(at_first, 0.0) / change, 1.0)
-        rows.append(after[k] + jnp.min(share) * kick)
-    return jnp.stack(rows)
+    if not has_friction(system):
+        return after
+    return with_friction(system, t, x, after, normal_velocity)
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:

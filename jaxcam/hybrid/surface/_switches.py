@@ -68,35 +68,6 @@ def surfaces(system: HybridSystem, t, x) -> Float[Array, " k"]:
     return jnp.atleast_1d(system.switching(t, x))
 
 
-def has_friction(system: HybridSystem) -> bool:
-    """Return whether the contacts of a system have friction."""
-    switched = system.system if isinstance(system, OnSides) else system
-    if not isinstance(switched, SwitchedSystem):
-        return False
-    return type(switched).contact_friction is not SwitchedSystem.contact_friction
-
-
-def sides_of(system: HybridSystem, t, x) -> Float[Array, " k"]:
-    """Return the sides of the motion, +1 or -1."""
-    if isinstance(system, OnSides):
-        return system.signs
-    assert isinstance(system, SwitchedSystem)
-    return system.sides(t, x)
-
-
-def surfaces_of(system: HybridSystem, t, x) -> Float[Array, " k"]:
-    """Return the switching functions of a switched system or of one of its branches."""
-    return surfaces(system.system if isinstance(system, OnSides) else system, t, x)
-
-
-def friction_of(system: HybridSystem, t, x) -> Float[Array, "m n"]:
-    """Return the friction of each contact, per unit of its normal force, on the sides
-    of the motion.
-    """
-    switched: Any = system.system if isinstance(system, OnSides) else system
-    return jnp.atleast_2d(switched.contact_friction(t, x, sides_of(system, t, x)))
-
-
 def resets(mode: OnSides, t, x) -> Float[Array, "k n"]:
     """Return the state after the crossing of each surface, one row for each."""
     return jnp.atleast_2d(mode.system.reset(t, x, mode.signs))
