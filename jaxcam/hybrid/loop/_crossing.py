@@ -108,7 +108,7 @@ def past_surfaces(
     return Passed(jets, slides, stuck)
 
 
-def seen_again(carried: LoopState, jets) -> LoopState:
+def _seen_again(carried: LoopState, jets) -> LoopState:
     """Replace the jets of a state whose mode has just changed by those of this mode.
 
     **Arguments:** the state, and the `jets` at the end of a step of length zero.
@@ -127,3 +127,20 @@ def seen_again(carried: LoopState, jets) -> LoopState:
             fresh, least = new._replace(gap=gap), 1.0
         after[k] = Jet(*select(change >= least, fresh, old))
     return carried._replace(jets=tuple(after))
+
+
+def refreshed(carried: LoopState, made: Step) -> tuple[LoopState, Step]:
+    """Return a state whose mode has just changed, and its step, with fitting jets."""
+    carried = _seen_again(carried, made.jets)
+    jets = of_constraints(carried, carried.jets, made.jets)
+    return carried, made._replace(jets=jets)
+
+
+def of_constraints(carried: LoopState, old, new) -> list:
+    """Return new jets, but the old ones of constraints in a step of length zero.
+
+    It only evaluates the jets of surfaces again: rounding must not undo a release.
+    """
+    again, m = carried.stale[0] > 0, len(carried.held)
+    kept = zip(old[:m], new[:m], strict=True)
+    return [*(Jet(*select(again, a, b)) for a, b in kept), *new[m:]]

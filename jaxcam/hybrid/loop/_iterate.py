@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from ..breakpoints import after
 from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
-from ._crossing import seen_again
+from ._crossing import of_constraints, refreshed
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
@@ -71,7 +71,7 @@ def _iterate(
     end = end_of_step(plan, carried, rounding)
     made = make_step(functions, plan, carried, end)
     if carried.stale:
-        carried, made = _seen_again(carried, made)
+        carried, made = refreshed(carried, made)
     judged = _judge_flights(plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
     landing = land(functions, plan, carried, end, made, lands, flown, rounding)
@@ -277,23 +277,6 @@ def _stale(carried, landing: Landing, released) -> tuple:
     return (jnp.where(landing.slides, 2.0, jnp.where(released, 1.0, 0.0)),)
 
 
-def _seen_again(carried: LoopState, made: Step) -> tuple[LoopState, Step]:
-    """Return a state whose mode has just changed, and its step, with fitting jets."""
-    carried = seen_again(carried, made.jets)
-    jets = _of_constraints(carried, carried.jets, made.jets)
-    return carried, made._replace(jets=jets)
-
-
-def _of_constraints(carried: LoopState, old, new) -> list:
-    """Return new jets, but the old ones of constraints in a step of length zero.
-
-    It only evaluates the jets of surfaces again: rounding must not undo a release.
-    """
-    again, m = carried.stale[0] > 0, len(carried.held)
-    kept = zip(old[:m], new[:m], strict=True)
-    return [*(Jet(*select(again, a, b)) for a, b in kept), *new[m:]]
-
-
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
     """Return the jets of the next step, in which rounding must not undo a contact.
 
@@ -326,7 +309,7 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
             )
         )
     if carried.stale:
-        same = _of_constraints(carried, carried.jets, after)
+        same = of_constraints(carried, carried.jets, after)
         after = [
             Jet(*select(landing.strikes, new, old)) for new, old in zip(after, same)
         ]
