@@ -31,7 +31,7 @@ class InclinedShaker(SwitchedSystem):
         >>> plane = InclinedShaker(incline=0.2, friction_coefficient=0.3, amplitude=0.0)
         >>> run = jaxcam.simulate(plane, [0.0, 0.0, 1.0, 0.0], 0.0, 3.0)
         >>> run.switches.time.round(6).tolist()
-        [1.067868]
+        [1.069073]
         >>> run.final[2].item()
         0.0
     """
