@@ -2,8 +2,9 @@
 
 Along the true motion of `_textbook_cases.py`, the internal state of a hysteresis is
 integrated for a grid of parameters, and its force is fitted together with a constant, a
-stiffness and a damping. Printed is what remains of the force that no linear oscillator
-has, as a share of its rms, for both kinds of hysteresis that a diagnosis tries.
+stiffness and a damping. The best point of the grid is then improved by the method of
+Nelder and Mead. Printed is what remains of the force that no linear oscillator has, as
+a share of its rms, for both kinds of hysteresis that a diagnosis tries.
 
     python -m benchmarks.textbook_hysteresis bouc_wen
 """
@@ -12,6 +13,7 @@ import argparse
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import minimize
 
 from benchmarks._textbook_cases import CASES, extra_force, moved, multisine
 from jaxcam.discrepancy.search._hidden_kinds import HYSTERESIS, STIFFENING
@@ -75,14 +77,25 @@ def main() -> None:
         (HYSTERESIS, np.geomspace(0.05, 20, 14), np.linspace(0.5, 1.5, 5)),
         (STIFFENING, np.geomspace(0.05, 20, 14), np.linspace(-6, 0, 13)),
     ):
-        limit, beta, n = _grid(limits, betas, (0.5, 1.0, 2.0))
         sign = 1 if kind is HYSTERESIS else -1
-        loading = sign * limit**-n
-        left = remaining(case, motion, loading, (1 - 2 * beta) * loading, n)
-        k = int(np.argmin(left))
+
+        def left(limit, beta, n, sign=sign):
+            loading = sign * np.asarray(limit) ** -n
+            return remaining(case, motion, loading, (1 - 2 * beta) * loading, n)
+
+        points = _grid(limits, betas, (0.5, 1.0, 2.0))
+        first = points[:, np.argmin(left(*points))]
+
+        def cost(at):
+            scale, beta, n = at
+            return float(left(np.exp([scale]), np.array([beta]), np.exp([n]))[0])
+
+        start = np.log(first[0]), first[1], np.log(first[2])
+        best = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 200})
+        limit, n = np.exp(best.x[[0, 2]])
         print(
-            f"{args.case}: a {kind.name} leaves {left[k]:.3f} of the force "
-            f"(limit {limit[k]:.3g}, beta {beta[k]:g}, power {n[k]:g})"
+            f"{args.case}: a {kind.name} leaves {best.fun:.4f} of the force "
+            f"(limit {limit:.3g}, beta {best.x[1]:.3g}, power {n:.3g})"
         )
 
 

@@ -88,7 +88,8 @@ def lyapunov_spectrum(
         values: Value of that parameter in each motion, shape `(lanes,)`.
         settings: Accuracy of the simulation; the default tolerance is 1e-12.
         blocks: Number of blocks for the standard error.
-        max_steps: Maximum number of attempted steps per motion.
+        max_steps: Maximum number of attempted steps per motion, or per period if the
+            system has switching surfaces.
         progress: Called with the fraction of periods completed.
 
     Returns:
@@ -183,10 +184,12 @@ def _by_turns(
     states, batched, shared, length, begin, end, settings, max_steps, seen, report
 ):
     """Fill `seen` from the derivatives of periods; return a code for each motion."""
-    del end, max_steps
+    del end
     carry = first_turn(states)
     while not seen.complete:
-        carry, after = next_turns(batched, shared, length, begin, settings, carry)
+        carry, after = next_turns(
+            batched, shared, length, begin, settings, max_steps, carry
+        )
         seen.take_turns(*map(np.asarray, (after.logs, after.impacts, after.state)))
         report()
     return carry.code

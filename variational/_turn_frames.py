@@ -15,8 +15,6 @@ from ._tangent_lanes import orthonormal
 
 # periods between two checks from Python
 TURNS = 16
-# attempted steps in one period, after which a motion is given up
-_MOST_STEPS = 100_000
 
 
 class TurnFrame(NamedTuple):
@@ -42,9 +40,11 @@ def first_turn(states: Float[Array, "lanes n"]) -> TurnFrame:
 
 
 @eqx.filter_jit
-def next_turns(batched, shared, length, begin, settings, carry: TurnFrame):
+def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnFrame):
     """Run the next `TURNS` periods; return the carried state, and its values at the end
     of each period, `(lanes, TURNS, ...)`.
+
+    **Arguments:** `max_steps` limits the attempted steps in a period.
     """
 
     def one(batched, carry):
@@ -56,7 +56,7 @@ def next_turns(batched, shared, length, begin, settings, carry: TurnFrame):
 
             def end(x):
                 made = flow(
-                    system, x, t, t + span, settings=settings, max_steps=_MOST_STEPS
+                    system, x, t, t + span, settings=settings, max_steps=max_steps
                 )
                 return made.state, made
 

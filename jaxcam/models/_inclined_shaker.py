@@ -24,7 +24,7 @@ class InclinedShaker(SwitchedSystem):
     force, and `static` times that while the block sticks; in an impact, its impulse is
     at most `friction_coefficient` times the normal impulse.
 
-    I. I. Blekhman, Vibrational Mechanics, World Scientific (2000), chapter 9.
+    I. I. Blekhman, Vibrational Mechanics, World Scientific (2000).
 
     Examples:
         >>> from jaxcam.models import InclinedShaker

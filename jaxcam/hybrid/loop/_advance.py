@@ -19,7 +19,7 @@ from ._select import any_of, select
 _PATIENCE = 80
 # part of one of these attempts for which an impact counts that loses energy: bodies
 # come to rest after many of them
-_LOSSY = 1 / 16
+_IMPACT_WEIGHT = 1 / 16
 # impacts on two constraints within this fraction of a natural step accumulate
 _TOGETHER = 1e-3
 # minimum number of steps per forcing period
@@ -282,7 +282,7 @@ def _weight(attempt):
     """Return for how many attempts without progress an attempt counts."""
     if len(attempt.held) < 2:
         return 1.0
-    return jnp.where(attempt.good & attempt.loses, _LOSSY, 1.0)
+    return jnp.where(attempt.good & attempt.loses, _IMPACT_WEIGHT, 1.0)
 
 
 def _crossed(carried, attempt):

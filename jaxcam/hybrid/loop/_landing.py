@@ -106,6 +106,7 @@ def land(
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
+    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
     ending = _ending(
         functions,
         plan,
@@ -117,9 +118,9 @@ def land(
         mode,
         hit,
         fastest,
+        pulled,
         rounding,
     )
-    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
     hidden = _hides(
         carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
     )
@@ -155,16 +156,29 @@ class _Ending(NamedTuple):
 
 
 def _ending(
-    functions, plan, carried, end, impact, speeds, jets, mode, hit, fastest, rounding
+    functions,
+    plan,
+    carried,
+    end,
+    impact,
+    speeds,
+    jets,
+    mode,
+    hit,
+    fastest,
+    pulled,
+    rounding,
 ) -> _Ending:
-    """Complete the impacts after one, on its constraint or on several."""
+    """Complete the impacts after one, on its constraint or on several.
+
+    **Arguments:** `pulled` is the size of the acceleration of the gap hit.
+    """
     if not functions.m:
         return _Ending(no_rest(impact), jnp.asarray(False), [], [])
     chatter = rest_of_chatter(functions, plan, impact, speeds, jets, mode, end.stop)
     # far enough into the sequence, or so low that rounding hides the next flight: its
     # height is v^2 / 2a, and below 250 times the rounding, it is hidden
     deep = impact.rebound <= plan.depth * fastest
-    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], impact.constraint))
     low = 500 * of_constraint(carried.blur, impact.constraint)
     hides = impact.rebound * impact.rebound <= low * pulled
     begins = chatter.possible & (deep | hides)

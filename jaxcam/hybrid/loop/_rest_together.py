@@ -8,17 +8,10 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from ..surface import LOSSY_RATIO, SHORT_FLIGHT, SLOW_REBOUND
 from ._functions import Functions
 from ._rest_of_chatter import Impact
 from ._select import any_of, largest
-
-
-# Flights shorter than this fraction of a natural step are negligible
-_SHORT = 1e-8
-# Normal velocities below this fraction of the fastest rebound are negligible
-_SLOW = 1e-13
-# Largest ratio of the normal velocities at an impact that loses energy
-_LOSSY = 1 - 1e-9
 
 
 class JointRest(NamedTuple):
@@ -42,7 +35,7 @@ def rest_together(
     `rounding` of each gap.
     """
     m = functions.m
-    small = (_SHORT * natural) ** 2, (_SLOW * fastest) ** 2
+    small = (SHORT_FLIGHT * natural) ** 2, (SLOW_REBOUND * fastest) ** 2
     strongest = largest([jnp.abs(jet.acceleration) for jet in jets[:m]])
     near = [~mode[k] & _ends(jets[k], strongest, *small, rounding[k]) for k in range(m)]
     closing = [hit[k] | near[k] for k in range(m)]
@@ -60,7 +53,7 @@ def rest_together(
 
 def loses_energy(impact: Impact):
     """Return whether the rebound is slower than the approach."""
-    return impact.rebound < -_LOSSY * impact.approach
+    return impact.rebound < -LOSSY_RATIO * impact.approach
 
 
 def _ends(jet, pull, short, slow, rounding):

@@ -3,7 +3,8 @@
 A piece is flight or contact, up to the next event. The engine is written in plain
 Python around a few compiled functions. It is slower than the loop but easier to follow,
 and it supports implicit solvers. It also serves as a check of the loop, with which it
-shares only the derivatives of the gap and the formula for the duration of chatter.
+shares only the derivatives of the gap, the formula for the duration of chatter, and the
+state in which bodies come to rest on several constraints.
 
 diffrax checks the sign of an event function at the ends of its steps and locates the
 event on an interpolant. A piece ends there at the latest; `_events.py` searches its
@@ -17,8 +18,8 @@ import numpy as np
 from .. import breakpoints
 from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
+from ._end_of_chatter import end_of_chatter, Rebound, Rest
 from ._events import Flown, TOO_LONG
-from ._joint_end import joint_end, JointEnd, stays_alone
 from ._motion import CompiledMotion, prepared
 
 
@@ -214,8 +215,7 @@ class _Engine:
         """Apply the impact law; complete the chatter if it is due."""
         after = np.asarray(self.motion.impact(t, before))[k]
         speeds = [np.asarray(self.motion.velocity(t, x)) for x in (before, after)]
-        u = max(float(speeds[1][k]), 0.0)
-        self.fastest = max(self.fastest, u)
+        self.fastest = max(self.fastest, float(speeds[1][k]))
         # an impact on one constraint may break contact with another
         reach = np.abs(before) + np.abs(after)
         rounding = np.asarray(self.motion.rounding(t, after, reach))[1]
@@ -230,39 +230,19 @@ class _Engine:
         self.crowded = self.crowded + 1 if np.any(closed & ~self.contact) else 0
         if self.crowded == _MANY:
             self.code = TOGETHER
-        incoming = -float(speeds[0][k])
-        if len(self.contact) > 1 and incoming > 0:
-            end = joint_end(
-                self.motion,
-                t,
-                after,
-                k,
-                self.contact,
-                u / incoming,
-                self.fastest,
-                tiny,
-                self.longest,
-            )
-            if end is not None:
-                self._close(k, before, end)
-                return
-        if u <= self.settings.chatter_depth * self.fastest:
-            end = self.motion.completion(t, after, self.contact, k, u, incoming)
-            length = float(end.duration)
-            alone = stays_alone(self.motion, t, after, k, self.contact, speeds, length)
-            if bool(end.possible) and alone and t + length <= self.end:
-                kept = self.contact.copy()
-                kept[k] = True
-                rest = JointEnd(t + length, np.asarray(end.state), kept)
-                self._close(k, before, rest)
-                return
+        rebound = Rebound(t, after, k, self.contact, speeds, self.fastest)
+        depth = self.settings.chatter_depth
+        rest = end_of_chatter(self.motion, rebound, depth, tiny, self.longest)
+        if rest is not None and rest.time <= self.end:
+            self._close(k, before, rest)
+            return
         self._row(RowKind.IMPACT, k, t, after, before)
 
-    def _close(self, k, before, end: JointEnd):
+    def _close(self, k, before, rest: Rest):
         """Log the last impact, on constraint `k`, and continue in contact."""
-        self.contact = end.contact
+        self.contact = rest.contact
         self._row(RowKind.LAST_IMPACT, k, self.t, self.x, before)
-        self.t, self.x = end.time, end.state
+        self.t, self.x = rest.time, rest.state
         self._row(RowKind.CONTACT, k, self.t, self.x)
 
     def _no_step(self) -> float:

@@ -14,20 +14,27 @@ from ._impact_law import (
     check_restitution as check_restitution,
     restitutions as restitutions,
 )
-from ._joint_rest import joint_rest as joint_rest
+from ._impacts import (
+    impacts as impacts,
+    restitution_coefficients as restitution_coefficients,
+)
+from ._joint_rest import (
+    joint_rest as joint_rest,
+    LOSSY_RATIO as LOSSY_RATIO,
+    SHORT_FLIGHT as SHORT_FLIGHT,
+    SLOW_REBOUND as SLOW_REBOUND,
+)
 from ._normal import (
     contact_multipliers as contact_multipliers,
     field_in_force as field_in_force,
     free_jet as free_jet,
     gaps as gaps,
-    impacts as impacts,
     lie_derivative as lie_derivative,
     lie_series as lie_series,
     mode_jet as mode_jet,
     normal_acceleration as normal_acceleration,
     normal_directions as normal_directions,
     normal_velocity as normal_velocity,
-    restitution_coefficients as restitution_coefficients,
     sticking_field as sticking_field,
 )
 from ._release_point import (

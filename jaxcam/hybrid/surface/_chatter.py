@@ -24,13 +24,12 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
+from ._impacts import impacts, restitution_coefficients
 from ._normal import (
-    impacts,
     lie_derivative,
     normal_acceleration,
     normal_directions,
     normal_velocity,
-    restitution_coefficients,
     sticking_field,
 )
 

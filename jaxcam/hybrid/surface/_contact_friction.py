@@ -1,6 +1,5 @@
-"""Coulomb friction of constraints, in contact and in impacts."""
+"""Coulomb friction of the constraints in contact."""
 
-from collections.abc import Callable
 from typing import Any
 
 import jax.numpy as jnp
@@ -38,31 +37,3 @@ def friction_of(system: HybridSystem, t, x) -> Float[Array, "m n"]:
     """
     switched: Any = system.system if isinstance(system, OnSides) else system
     return jnp.atleast_2d(switched.contact_friction(t, x, sides_of(system, t, x)))
-
-
-def with_friction(
-    system, t, x, after: Float[Array, "m n"], normal_velocity: Callable
-) -> Float[Array, "m n"]:
-    """Add the impulses of friction to frictionless impacts.
-
-    Each is the friction of a contact times the impulse in the normal direction, but at
-    most what stops the slip (Coulomb's law; exact where the normal impulse does not
-    change the slip).
-    """
-    kicks = friction_of(system, t, x)
-    before = normal_velocity(system, t, x)
-
-    def slips(y):
-        return sides_of(system, t, x) * surfaces_of(system, t, y)
-
-    rows = []
-    for k in range(after.shape[0]):
-        impulse = normal_velocity(system, t, after[k])[k] - before[k]
-        kick = impulse * kicks[k]
-        at_first, at_last = slips(after[k]), slips(after[k] + kick)
-        # surfaces that this friction does not change are none of its slips
-        reverses = (at_last < 0) & (at_last < at_first)
-        change = jnp.where(reverses, at_first - at_last, 1.0)
-        share = jnp.where(reverses, jnp.maximum(at_first, 0.0) / change, 1.0)
-        rows.append(after[k] + jnp.min(share) * kick)
-    return jnp.stack(rows)

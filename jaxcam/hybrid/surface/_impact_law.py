@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._system import HybridSystem
-from ._normal import gaps, impacts, normal_velocity
+from ._impacts import impacts
+from ._normal import gaps, normal_velocity
 from ._rounding import speed_rounding
 
 

@@ -15,6 +15,14 @@ from ._normal import (
 )
 
 
+# Flights shorter than this fraction of a natural step are negligible
+SHORT_FLIGHT = 1e-8
+# Normal velocities below this fraction of the fastest rebound are negligible
+SLOW_REBOUND = 1e-13
+# Largest ratio of the normal velocities at an impact that loses energy
+LOSSY_RATIO = 1 - 1e-9
+
+
 def joint_rest(
     system: HybridSystem, t: RealScalar, x: State, touching: Bool[Array, " m"]
 ) -> tuple[State, Float[Array, " m"]]:

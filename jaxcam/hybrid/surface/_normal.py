@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
-from ._contact_friction import friction_of, has_friction, with_friction
+from ._contact_friction import friction_of, has_friction
 from ._masked import solve_masked
 
 
@@ -38,30 +38,6 @@ def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
         [1.0]
     """
     return jnp.atleast_1d(system.gap(t, x))
-
-
-def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"]:
-    """Return the state after an impact at each constraint, one row for each; friction
-    included.
-
-    Args:
-        system: The system.
-        t: Time (s).
-        x: State just before the impact, shape `(n,)`.
-
-    Returns:
-        States after the impact, shape `(m, n)`.
-
-    Examples:
-        >>> from jaxcam.hybrid.surface import impacts
-        >>> from jaxcam.models import BouncingBall
-        >>> impacts(BouncingBall(), 0.0, jnp.array([0.0, -1.0])).tolist()
-        [[0.0, 0.8]]
-    """
-    after = jnp.atleast_2d(system.impact(t, x))
-    if not has_friction(system):
-        return after
-    return with_friction(system, t, x, after, normal_velocity)
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:
@@ -316,38 +292,4 @@ def jet_along(system, t, x, contact, field: Callable, multiplier: Callable):
             jnp.where(contact, release, jerk),
         ],
         axis=1,
-    )
-
-
-def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
-    """Return the coefficient of restitution of each constraint in the limit of slow
-    impacts.
-
-    Args:
-        system: The system.
-        t: Time (s).
-        x: State, shape `(n,)`.
-
-    Returns:
-        Coefficients of restitution, shape `(m,)`.
-
-    Examples:
-        >>> from jaxcam.hybrid.surface import restitution_coefficients
-        >>> from jaxcam.models import BouncingBall
-        >>> r = restitution_coefficients(BouncingBall(), 0.0, jnp.zeros(2))
-        >>> round(float(r[0]), 6)
-        0.8
-    """
-    directions = normal_directions(system, t, x)
-
-    def rebound(speed, k):
-        after = impacts(system, t, x + speed * directions[k])[k]
-        return normal_velocity(system, t, after)[k]
-
-    zero = jnp.zeros_like(t)
-    return jnp.stack(
-        [
-            -jax.jvp(lambda s, k=k: rebound(s, k), (zero,), (jnp.ones_like(t),))[1]
-            for k in range(directions.shape[0])
-        ]
     )
