@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,6 +13,7 @@ from jaxtyping import Float
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
 from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
+from ._missed_impacts import Spans, with_missed_impacts
 from .engine import Layout, Model, Parameter, parameter_places, with_constants
 
 
@@ -34,11 +36,15 @@ def segment_by_model(
     is zero where its velocity jumps, as far as the tolerances of the parameters allow.
     Without a gap, the whole recording is one flight.
 
+    If parameters are given, they are fitted to short pieces of the flights. Where the
+    model does not describe a piece, in contrast to most others, less significant
+    impacts are sought, and a flight that follows contact begins later.
+
     Args:
         model: The model. State components count as measured if a sensor without a
             bandwidth has their index as `observe`.
         recordings: The recordings.
-        parameters: Parameters whose tolerances limit the error of a gap.
+        parameters: Parameters to fit; their tolerances limit the error of a gap.
         drive_channel: The channel of the drive's encoder (rad), for a model with a
             `Turning` drive.
         restitution: Expected coefficient of restitution, for impacts too weak to be
@@ -62,39 +68,71 @@ def segment_by_model(
         >>> parts[0].impacts.count
         1
     """
+    parameters = tuple(parameters)
+    recordings = tuple(recordings)
     picks = {
         sensor.observe: name
         for name, sensor in reversed(tuple(model.sensors.items()))
         if isinstance(sensor.observe, int) and not sensor.filtered
     }
-    primary = next(iter(model.sensors))
-    found = []
+    gaps = []
     for k, recording in enumerate(recordings):
         if progress is not None:
             progress(k / len(recordings))
-        drive = None if drive_channel is None else read_drive(recording, drive_channel)
-        states = _states(model, picks, recording)
-        here = with_constants(model, recording)
-        gaps, slopes, errors = _gaps(here, tuple(parameters), recording, states, drive)
-        shown = np.any(slopes != 0, axis=-1)
-        if not np.any(shown):
-            part = segment(recording, primary)
-            found.append(dataclasses.replace(part, drive=drive))
-            continue
-        _refuse_unseen(model, picks, recording, slopes)
-        found.append(
-            segment_gaps(
-                recording,
-                primary,
-                gaps[shown],
-                [float(e) for e in errors[shown]],
-                drive=drive,
-                restitution=restitution,
-            )
+        gaps.append(_shown_gaps(model, parameters, picks, recording, drive_channel))
+
+    def again(doubted: Sequence[Spans]) -> tuple[Segments, ...]:
+        return tuple(
+            _segmented(model, recording, shown, restitution, spans)
+            for recording, shown, spans in zip(recordings, gaps, doubted)
         )
+
+    found = again([()] * len(recordings))
+    if parameters and any(part.impacts.count for part in found):
+        found = with_missed_impacts(model, parameters, found, again)
     if progress is not None:
         progress(1.0)
-    return tuple(found)
+    return found
+
+
+class _ShownGaps(NamedTuple):
+    """The gaps that the channels determine `(g, k)`, and their errors `(g,)`."""
+
+    gaps: Float[np.ndarray, "g k"]
+    errors: Float[np.ndarray, " g"]
+    drive: Drive | None
+
+
+def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGaps:
+    drive = None if drive_channel is None else read_drive(recording, drive_channel)
+    states = _states(model, picks, recording)
+    here = with_constants(model, recording)
+    gaps, slopes, errors = _gaps(here, parameters, recording, states, drive)
+    shown = np.any(slopes != 0, axis=-1)
+    if np.any(shown):
+        _refuse_unseen(model, picks, recording, slopes)
+    return _ShownGaps(gaps[shown], errors[shown], drive)
+
+
+def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
+    primary = next(iter(model.sensors))
+    if not len(shown.gaps):
+        part = segment(recording, primary)
+        return dataclasses.replace(part, drive=shown.drive)
+    time = recording.time
+    doubted = [
+        (int(np.searchsorted(time, start)), int(np.searchsorted(time, stop)))
+        for start, stop in spans
+    ]
+    return segment_gaps(
+        recording,
+        primary,
+        shown.gaps,
+        [float(e) for e in shown.errors],
+        drive=shown.drive,
+        restitution=restitution,
+        doubted=doubted,
+    )
 
 
 def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:

@@ -52,12 +52,14 @@ class Pieces(eqx.Module):
 
     - `flown`, `rested`: samples in flight and in contact.
     - `joint`: the predecessor of each piece of flight: nothing, flight, or an impact.
-    - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the drive in the middle
-        of each step; `angle_at`, `rate_at` `(r, k)`: at the beginning of each piece.
-        For a measured input, `angle` is its level and `rate` is zero.
+    - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the angle of the drive
+        in the middle of each step, and its mean rate; `angle_at`, `rate_at` `(r, k)`:
+        at the beginning of each piece. For a measured input, `angle` is its level and
+        `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
-    - `drive_error`: standard errors of the drive's angle and rate, for each recording.
+    - `drive_error`: standard errors of the drive's angle and rate, and of the mean of
+        the angle over one second, for each recording.
     - `substeps`: number of parts into which a prediction divides each step.
     """
 
@@ -73,7 +75,7 @@ class Pieces(eqx.Module):
     rest_angle: Float[Numbers, "r kc n1"]
     rest_rate: Float[Numbers, "r kc n1"]
     reach: Float[Numbers, " r"]
-    drive_error: Float[Numbers, "r 2"]
+    drive_error: Float[Numbers, "r 3"]
     substeps: int = eqx.field(static=True, default=1)
 
 
@@ -215,7 +217,8 @@ def gather(
     middle = flown.start[..., None] + flown.step[..., None] * (np.arange(steps) + 0.5)
     nodes = rested.start[..., None] + rested.step[..., None] * np.arange(steps + 1)
     if measured is None:
-        angle, rate = _drive(segments, middle)
+        angle, _ = _drive(segments, middle)
+        rate = _mean_rate(segments, flown, steps)
         angle_at, rate_at = _drive(segments, flown.start)
         rest_angle, rest_rate = _drive(segments, nodes)
     else:
@@ -278,6 +281,23 @@ def _drive(segments, times):
     return angle, rate
 
 
+def _mean_rate(segments, flown: Samples, steps: int):
+    """Return the mean rate of each recording's drive in every step, `(r, k, n)`.
+
+    The noise of the mean cancels between neighbouring steps, unlike that of a sample.
+    """
+    step = np.asarray(flown.step)[..., None]
+    edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
+    mean = np.ones((*flown.start.shape, steps))
+    for row, part in enumerate(segments):
+        if part.drive is not None:
+            time = part.recording.time
+            middle = (part.drive.rate[1:] + part.drive.rate[:-1]) / 2
+            turned = np.concatenate([[0.0], np.cumsum(middle * np.diff(time))])
+            mean[row] = np.diff(np.interp(edges[row], time, turned)) / step[row]
+    return mean
+
+
 def _input(segments, channel: str, times):
     """Return the input of each recording, held since the last sample, in the shape of
     `times`.
@@ -323,13 +343,16 @@ def _integrals(time, level, at):
     return once, second[last] + first[last] * after + level[last] * after**2 / 2
 
 
-def _drive_error(part: Segments) -> tuple[float, float]:
-    """Return the standard errors of the smoothed angle and rate of a drive."""
+def _drive_error(part: Segments) -> tuple[float, float, float]:
+    """Return the standard errors of the smoothed angle and rate of a drive, and of the
+    mean angle over one second.
+    """
     if part.drive is None:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     interval = part.recording.interval
     count = part.drive.window
     smooth = savgol_coeffs(count, 2)
     slope = savgol_coeffs(count, 2, deriv=1, delta=interval)
-    noise = part.drive.noise
-    return noise * float(np.linalg.norm(smooth)), noise * float(np.linalg.norm(slope))
+    shares = np.linalg.norm(smooth), np.linalg.norm(slope), np.sqrt(interval)
+    angle, rate, mean = (part.drive.noise * float(share) for share in shares)
+    return angle, rate, mean

@@ -7,7 +7,7 @@ import numpy as np
 
 from ._linear import Extras, Sharpness
 from ._linearise import assemble, Layout, Point
-from ._model import filtered_channels
+from ._model import augmented_field, filtered_channels
 from ._pieces import IMPACT, Pieces
 from ._predict import fly, smallest_gap
 from ._program import program
@@ -145,21 +145,25 @@ def _variances(ss, before):
 
 @program
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
-    """Return the error of each piece's initial state, `(r, k, n)`, due to the drive.
+    """Return the error of each piece's initial state, `(r, k, n)`, due to the noise of
+    the drive during the previous piece.
 
-    It results from errors of the drive during the previous piece, independent from
-    piece to piece.
+    The noise of the samples is independent, that of the smoothed angle and rate is not.
+    Integration by parts turns the effect of the rate into one of the angle; what
+    remains at the ends of a piece cancels between neighbours.
     """
 
     def one(values, error, states, start, step, angles, rates):
         model = layout.at(values)
 
         def spread(state, start, step, angle, rate):
-            def end(shift):
-                turned = angle + shift[0], rate + shift[1]
+            def end(shifts):
+                turned = angle + shifts[0], rate + shifts[1]
                 return fly(model, state, start, step, *turned)[0]
 
-            return jnp.sqrt(jax.jacfwd(end)(jnp.zeros(2)) ** 2 @ error**2)
+            slopes = jax.jacfwd(end)(jnp.zeros((2, *angle.shape)))
+            weights = slopes[:, 0] - jnp.gradient(slopes[:, 1], axis=-1) / step
+            return error[2] * jnp.sqrt(jnp.sum(weights**2, axis=-1) / step)
 
         found = jax.vmap(spread)(states, start, step, angles, rates)
         return jnp.concatenate([found[:1], found[:-1]])
@@ -180,20 +184,30 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
         model = layout.at(values)
         size = state.shape[0] - len(filtered_channels(model))
 
+        def by_rate(x):
+            def field(rate):
+                return augmented_field(model, model.driven(t, angle, rate), t, x)
+
+            return jax.jacfwd(field)(rate)
+
         def landed(drive):
+            # the noise of the angle, as that of the rate, shifts the state in flight
+            x = state + by_rate(state) * (drive[0] - angle)
             system = model.driven(t, drive[0], drive[1])
-            x = system.impact(t, state[:size])
-            gap = smallest_gap(system, t, state[:size])
-            if x.ndim == 2:
-                x = x[jnp.argmin(system.gap(t, state[:size]))]
-            return jnp.concatenate([x, state[size:], gap[None]])
+            after = system.impact(t, x[:size])
+            gap = smallest_gap(system, t, x[:size])
+            if after.ndim == 2:
+                after = after[jnp.argmin(system.gap(t, x[:size]))]
+            after = jnp.concatenate([after, x[size:]])
+            after = after - by_rate(after) * (drive[0] - angle)
+            return jnp.concatenate([after, gap[None]])
 
         def gap_of(x):
             system = model.driven(t, angle, rate)
             return smallest_gap(system, t, x[:size])
 
         jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate]))
-        spread = jnp.sqrt(jacobian**2 @ error**2)
+        spread = jnp.sqrt(jacobian**2 @ error[:2] ** 2)
         return jax.grad(gap_of)(state), spread
 
     along = jax.vmap(one, in_axes=(None, 0, 0, 0, 0, None))

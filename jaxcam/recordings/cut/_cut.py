@@ -34,7 +34,7 @@ _FAR_NOISE, _FAR_GAP = 20.0, 0.25
 
 
 def cut(
-    sides: Sequence[Motion], restitution: float
+    sides: Sequence[Motion], restitution: float, doubted: Sequence[Span] = ()
 ) -> tuple[tuple[Flight, ...], tuple[Contact, ...], Impacts]:
     """Segment a motion within one or several surfaces.
 
@@ -43,9 +43,12 @@ def cut(
     - `sides`: the motion relative to each surface, with a positive gap; it is
       `mirrored` for a surface above the motion, and the distance for a moving body.
     - `restitution`: expected value, for impacts too weak to be observed.
+    - `doubted`: stretches of samples that a model of the flight does not describe; a
+        less significant impact is sought there, and a flight that follows contact
+        begins at its last sample near the surface.
     """
     motion = sides[0]
-    resting, doubtful, marks = _places(sides)
+    resting, doubtful, marks = _places(sides, doubted)
     while True:
         stretches = sorted([*resting, *doubtful])
         spans = _spans(len(motion.time), stretches, sorted(marks))
@@ -82,6 +85,9 @@ def cut(
             end = after[last]
             release = _release(here, first, last, end)
             latest = float(motion.time[(last + end) // 2])
+            if any(a < last < b for a, b in doubted):
+                boundaries[last] = _still_near(float(motion.time[last]), latest)
+                continue
             boundaries[last] = _not_before(boundaries.get(first), release, latest)
     for place in (0, len(motion.time)):
         boundaries[place] = _end(motion, place, "the recording ends here")
@@ -109,7 +115,7 @@ def cut(
     return tuple(flights), tuple(contacts), _gather(impacts)
 
 
-def _places(sides: Sequence[Motion]):
+def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
     """Return contacts, doubtful contacts and impacts, each with the index of its
     side.
     """
@@ -120,7 +126,7 @@ def _places(sides: Sequence[Motion]):
     marks: dict[int, int] = {}
     for number, side in enumerate(sides):
         found, unsure = contact_stretches(side)
-        for mark in impact_marks(side, found):
+        for mark in impact_marks(side, found, doubted):
             # next to a jump, the windows show jumps of the opposite sign
             near = side.gap[mark - 1 : mark + 1]
             if number in nearest[mark - 1 : mark + 1] and np.min(near) < _reach(side):
@@ -251,6 +257,15 @@ def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary
         return release
     evidence = "flights too low to be observed may last until here"
     return Boundary(min(late, latest), landing.stderr, "impact", evidence)
+
+
+def _still_near(time: float, latest: float) -> Boundary:
+    """Return the end of a contact that continues while the motion is near the surface.
+
+    A release would begin a flight that a model of it does not describe.
+    """
+    evidence = "flights too low to be observed may last until here"
+    return Boundary(min(time, latest), WINDOW / 2, "impact", evidence)
 
 
 def _flight(sides, span, boundaries, left: set[int]) -> Flight:

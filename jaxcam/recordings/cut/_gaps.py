@@ -22,6 +22,7 @@ def segment_gaps(
     *,
     drive: Drive | None = None,
     restitution: float = 0.5,
+    doubted: Sequence[tuple[int, int]] = (),
 ) -> Segments:
     """Segment a recording at the impacts at each gap; the gaps are given at every
     sample.
@@ -37,6 +38,8 @@ def segment_gaps(
         tolerance, the gap is shifted to zero at the impacts.
     - `drive`: the drive of the system, if it has one.
     - `restitution`: expected value, for impacts too weak to be observed.
+    - `doubted`: stretches of samples, from the first to after the last, that a model of
+        the flight does not describe; an impact is sought there.
 
     **Returns:** the parts; `impacts.side` is the gap that closed, and `before` and
     `after` are its rates of change.
@@ -47,7 +50,7 @@ def segment_gaps(
         noise = measured_noise(gap)
         side = Motion(recording.time, gap, none, none, noise, recording.interval)
         sides.append(placed(side, tolerance) if tolerance > 0 else side)
-    flights, contacts, impacts = cut(sides, restitution)
+    flights, contacts, impacts = cut(sides, restitution, doubted)
     return Segments(
         recording,
         channel,

@@ -3,6 +3,8 @@
 A velocity jump separates two flights, however short the contact is.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ._contact_stretches import (
@@ -17,12 +19,18 @@ from ._kinks import find_kinks
 from ._motion import Motion
 
 
-def impact_marks(motion: Motion, resting) -> list[int]:
-    """Return the index of the first sample after each impact between two flights."""
+def impact_marks(
+    motion: Motion, resting: list[Span], doubted: Sequence[Span] = ()
+) -> list[int]:
+    """Return the index of the first sample after each impact between two flights.
+
+    **Arguments:** the stretches of contact, and stretches in which an impact is
+    expected.
+    """
     kinks = find_kinks(motion.samples, motion.interval, motion.noise)
     marks = [int(kink) for kink in kinks]
     near = stretches(motion.gap < LOW * motion.noise)
-    for first, last in near:
+    for first, last in (*near, *doubted):
         taken = [*resting, *((mark, mark + 1) for mark in marks)]
         if any(overlap((first, last), other) for other in taken):
             continue
@@ -31,6 +39,9 @@ def impact_marks(motion: Motion, resting) -> list[int]:
         begin = max([begin, *(b for _, b in resting if b <= first)])
         end = min([len(motion.time), *(m for m in marks if m >= last)])
         end = min([end, *(a for a, _ in resting if a >= last)])
+        if (first, last) in doubted:
+            # another impact may precede the stretch
+            begin = max(begin, first)
         place, significance = _hinge(motion, (first, last), (begin, end))
         if significance > SIGNIFICANT:
             marks.append(place)

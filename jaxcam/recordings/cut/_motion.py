@@ -12,6 +12,8 @@ from ._polynomial import fit_local, LocalFit
 _FIT_WINDOW, _FEWEST = 0.1, 16
 # Residuals (in units of the noise) above which a cubic does not follow a stretch
 _FOLLOWED = 2.0
+# Standard errors of the next coefficient above which a cubic does not follow it either
+_NEXT = 2.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,6 +60,16 @@ class Motion:
             count = shorter
 
     def _follows(self, fit: LocalFit, time, samples) -> bool:
+        """Return whether a polynomial of the next degree describes the samples no
+        better; its truncation would act mainly on the slope at the end.
+        """
         off = samples - fit.values(time)
-        free = max(1, len(time) - len(fit.coefficients))
+        degree = len(fit.coefficients)
+        free = max(1, len(time) - degree)
+        scale = max(float(np.max(np.abs(time - fit.origin))), np.finfo(float).tiny)
+        powers = ((time - fit.origin) / scale)[:, None] ** np.arange(degree + 1)
+        # the component of the residuals along what the next power adds
+        added = np.linalg.qr(powers)[0][:, -1]
+        if abs(float(added @ off)) > _NEXT * self.noise:
+            return False
         return float(np.sum(off**2)) <= (_FOLLOWED * self.noise) ** 2 * free
