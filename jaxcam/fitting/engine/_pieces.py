@@ -58,8 +58,8 @@ class Pieces(eqx.Module):
         `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
-    - `drive_error`: standard errors of the drive's angle and rate, and of the mean of
-        the angle over one second, for each recording.
+    - `drive_error`: standard errors of the drive's angle, of its rate, of the integral
+        of its rate, and of the mean angle over one second, for each recording.
     - `substeps`: number of parts into which a prediction divides each step.
     """
 
@@ -75,7 +75,7 @@ class Pieces(eqx.Module):
     rest_angle: Float[Numbers, "r kc n1"]
     rest_rate: Float[Numbers, "r kc n1"]
     reach: Float[Numbers, " r"]
-    drive_error: Float[Numbers, "r 3"]
+    drive_error: Float[Numbers, "r 4"]
     substeps: int = eqx.field(static=True, default=1)
 
 
@@ -343,16 +343,16 @@ def _integrals(time, level, at):
     return once, second[last] + first[last] * after + level[last] * after**2 / 2
 
 
-def _drive_error(part: Segments) -> tuple[float, float, float]:
-    """Return the standard errors of the smoothed angle and rate of a drive, and of the
-    mean angle over one second.
+def _drive_error(part: Segments) -> tuple[float, float, float, float]:
+    """Return the standard errors of a drive: of its smoothed angle and rate, of the
+    integral of that rate, and of the mean angle over one second.
     """
     if part.drive is None:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     interval = part.recording.interval
     count = part.drive.window
     smooth = savgol_coeffs(count, 2)
     slope = savgol_coeffs(count, 2, deriv=1, delta=interval)
-    shares = np.linalg.norm(smooth), np.linalg.norm(slope), np.sqrt(interval)
-    angle, rate, mean = (part.drive.noise * float(share) for share in shares)
-    return angle, rate, mean
+    weights = smooth, slope, np.cumsum(slope) * interval
+    angle, rate, turned = (part.drive.noise * float(np.linalg.norm(w)) for w in weights)
+    return angle, rate, turned, part.drive.noise * float(np.sqrt(interval))

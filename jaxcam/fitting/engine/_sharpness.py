@@ -163,7 +163,7 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
             slopes = jax.jacfwd(end)(jnp.zeros((2, *angle.shape)))
             weights = slopes[:, 0] - jnp.gradient(slopes[:, 1], axis=-1) / step
-            return error[2] * jnp.sqrt(jnp.sum(weights**2, axis=-1) / step)
+            return error[3] * jnp.sqrt(jnp.sum(weights**2, axis=-1) / step)
 
         found = jax.vmap(spread)(states, start, step, angles, rates)
         return jnp.concatenate([found[:1], found[:-1]])
@@ -191,23 +191,23 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
             return jax.jacfwd(field)(rate)
 
         def landed(drive):
-            # the noise of the angle, as that of the rate, shifts the state in flight
-            x = state + by_rate(state) * (drive[0] - angle)
+            # the integrated noise of the rate shifts the state in flight
+            x = state + by_rate(state) * drive[2]
             system = model.driven(t, drive[0], drive[1])
             after = system.impact(t, x[:size])
             gap = smallest_gap(system, t, x[:size])
             if after.ndim == 2:
                 after = after[jnp.argmin(system.gap(t, x[:size]))]
             after = jnp.concatenate([after, x[size:]])
-            after = after - by_rate(after) * (drive[0] - angle)
+            after = after - by_rate(after) * drive[2]
             return jnp.concatenate([after, gap[None]])
 
         def gap_of(x):
             system = model.driven(t, angle, rate)
             return smallest_gap(system, t, x[:size])
 
-        jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate]))
-        spread = jnp.sqrt(jacobian**2 @ error[:2] ** 2)
+        jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate, jnp.zeros_like(angle)]))
+        spread = jnp.sqrt(jacobian**2 @ error[:3] ** 2)
         return jax.grad(gap_of)(state), spread
 
     along = jax.vmap(one, in_axes=(None, 0, 0, 0, 0, None))
