@@ -1,7 +1,7 @@
 """Define a system whose vector field has several branches, joined at surfaces."""
 
 import abc
-from typing import Any
+from typing import Any, Literal
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -124,6 +124,19 @@ class SwitchedSystem(HybridSystem):
         """
         return 1.0
 
+    @property
+    def restitution_kind(self) -> Literal["kinematic", "kinetic", "energetic"]:
+        """Return the meaning of the coefficient of restitution with contact friction.
+
+        `"kinematic"` (Newton, the default): ratio of the normal velocities after and
+        before the impact. `"kinetic"` (Poisson): ratio of the normal impulses in
+        restitution and in compression. `"energetic"` (Stronge): root of the ratio of
+        the works of the normal force; only then can an impact never increase the
+        energy. They differ if friction changes the normal velocity and the slip stops
+        or reverses during the impact.
+        """
+        return "kinematic"
+
     def contact_friction(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]
     ) -> Float[Array, "*constraints n"]:
@@ -136,7 +149,9 @@ class SwitchedSystem(HybridSystem):
         function, only the rate of the velocity along x is not zero:
         `-mu * sides[0]`. At zero slip the body sticks while the force that this takes
         is less than mu times the normal force. `impact` is then the law without
-        friction: the impulse of friction, at most what stops the slip, is added to it.
+        friction, from which the coefficient of restitution follows; `restitution_kind`
+        says how that is to be understood. During an impact, the body slips until
+        friction has stopped it; then it sticks, or slips back if friction is too weak.
 
         Args:
             t: Time (s).

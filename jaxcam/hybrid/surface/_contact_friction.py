@@ -35,5 +35,18 @@ def friction_of(system: HybridSystem, t, x) -> Float[Array, "m n"]:
     """Return the friction of each contact, per unit of its normal force, on the sides
     of the motion.
     """
+    return friction_on(system, t, x, sides_of(system, t, x))
+
+
+def friction_on(
+    system: HybridSystem, t, x, sides: Float[Array, " k"]
+) -> Float[Array, "m n"]:
+    """Return the friction of each contact on the given sides."""
     switched: Any = system.system if isinstance(system, OnSides) else system
-    return jnp.atleast_2d(switched.contact_friction(t, x, sides_of(system, t, x)))
+    return jnp.atleast_2d(switched.contact_friction(t, x, sides))
+
+
+def restitution_kind(system: HybridSystem) -> str:
+    """Return the hypothesis of restitution of a system with friction."""
+    switched: Any = system.system if isinstance(system, OnSides) else system
+    return switched.restitution_kind

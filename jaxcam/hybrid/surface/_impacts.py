@@ -1,12 +1,21 @@
 """Impacts at the constraints, with Coulomb friction."""
 
+from typing import Any, NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
-from ._contact_friction import friction_of, has_friction, sides_of, surfaces_of
+from ._contact_friction import (
+    friction_on,
+    has_friction,
+    restitution_kind,
+    sides_of,
+    surfaces_of,
+)
+from ._frictional_impact import impulses, Rates
 from ._normal import normal_directions, normal_velocity
 
 
@@ -71,26 +80,58 @@ def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
 def _with_friction(
     system: HybridSystem, t: RealScalar, x: State, after: Float[Array, "m n"]
 ) -> Float[Array, "m n"]:
-    """Add the impulses of friction to frictionless impacts.
-
-    Each is the friction of a contact times the impulse in the normal direction, but at
-    most what stops the slip (Coulomb's law; exact where the normal impulse does not
-    change the slip).
+    """Add the impulses of friction to frictionless impacts, and change those in the
+    normal direction accordingly.
     """
-    kicks = friction_of(system, t, x)
-    before = normal_velocity(system, t, x)
-
-    def slips(y):
-        return sides_of(system, t, x) * surfaces_of(system, t, y)
-
+    sides, directions = sides_of(system, t, x), normal_directions(system, t, x)
+    approach = normal_velocity(system, t, x)
+    kind = restitution_kind(system)
     rows = []
-    for k in range(after.shape[0]):
-        impulse = normal_velocity(system, t, after[k])[k] - before[k]
-        kick = impulse * kicks[k]
-        at_first, at_last = slips(after[k]), slips(after[k] + kick)
-        # surfaces that this friction does not change are none of its slips
-        reverses = (at_last < 0) & (at_last < at_first)
-        change = jnp.where(reverses, at_first - at_last, 1.0)
-        share = jnp.where(reverses, jnp.maximum(at_first, 0.0) / change, 1.0)
-        rows.append(after[k] + jnp.min(share) * kick)
+    for k, row in enumerate(after):
+        rebound = normal_velocity(system, t, row)[k]
+        moving = jnp.where(approach[k] < 0, approach[k], -1.0)
+        coefficient = jnp.where(approach[k] < 0, -rebound / moving, 0.0)
+        one = _one_contact(system, t, x, k, sides, directions[k])
+        found = impulses(one.side, one.slip, approach[k], coefficient, one.rates, kind)
+        more = found.total - (rebound - approach[k])
+        friction = found.positive * one.positive + found.negative * one.negative
+        rows.append(row + more * directions[k] + friction)
     return jnp.stack(rows)
+
+
+class _Contact(NamedTuple):
+    """The slip at one contact: its side and size, and the friction during positive and
+    negative slip `(n,)`.
+    """
+
+    side: Any
+    slip: Any
+    positive: State
+    negative: State
+    rates: Rates
+
+
+def _one_contact(system, t, x, k: int, sides, direction) -> _Contact:
+    """Find the switching function on which the friction of constraint `k` depends."""
+    same = friction_on(system, t, x, sides)[k]
+    # without one, friction never changes
+    found = jnp.asarray(1.0), jnp.asarray(jnp.inf), same, same
+    place = jnp.asarray(0)
+    for j in reversed(range(len(sides))):
+        both = [
+            friction_on(system, t, x, sides.at[j].set(side))[k] for side in (1.0, -1.0)
+        ]
+        depends = jnp.any(both[0] != both[1])
+        slip = jnp.maximum(sides[j] * surfaces_of(system, t, x)[j], 0.0)
+        mine = sides[j], slip, *both
+        found = tuple(jnp.where(depends, a, b) for a, b in zip(mine, found))
+        place = jnp.where(depends, j, place)
+
+    def velocities(y):
+        slips = surfaces_of(system, t, y)
+        return slips[place], normal_velocity(system, t, y)[k]
+
+    rates = Rates(
+        *(jax.jvp(velocities, (x,), (direction + part,))[1] for part in found[2:])
+    )
+    return _Contact(*found, rates)

@@ -1,0 +1,121 @@
+"""Impulses of an impact with Coulomb friction at one contact.
+
+In the course of an impact, the normal impulse P grows and the state changes in
+proportion. With the slip velocity s and the normal velocity v, this is a
+piecewise-smooth system in two variables with P as its time (Routh's method): the slip
+decreases at a constant rate until it is zero; then it remains zero if friction suffices
+(the condition of Filippov for sliding), otherwise it reverses. The impact ends where
+the hypothesis of restitution says.
+"""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+
+class Rates(NamedTuple):
+    """Changes of the slip and normal velocities, per unit of normal impulse, while the
+    slip is positive, and while it is negative.
+    """
+
+    positive: tuple[Any, Any]
+    negative: tuple[Any, Any]
+
+
+class Impulses(NamedTuple):
+    """The normal impulse, and its parts during positive and negative slip.
+
+    While the slip remains zero, the friction is a mixture of both.
+    """
+
+    total: Any
+    positive: Any
+    negative: Any
+
+
+def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impulses:
+    """Return the impulses of an impact.
+
+    **Arguments:**
+
+    - `side` (+1 or -1) of the slip, and its size `slip` >= 0.
+    - `approach`: normal velocity before the impact, negative.
+    - `restitution`: the coefficient of restitution.
+    - `kind`: `"kinematic"` (Newton), `"kinetic"` (Poisson) or `"energetic"` (Stronge).
+
+    **References:** W. J. Stronge, Impact Mechanics (2000), sections 3.1 to 3.4; J. B.
+    Keller, Impact with friction, Journal of Applied Mechanics 53 (1986), 1-4.
+    """
+    before = _of_side(side > 0, rates)
+    # rate of the size of the slip, and when it ends
+    closing = -side * before[0]
+    slows = closing > 0
+    first = jnp.where(slows, slip / jnp.where(slows, closing, 1.0), jnp.inf)
+    # afterwards: no slip if friction holds it on both sides, otherwise it reverses (or,
+    # from zero slip, begins)
+    (s1, v1), (s2, v2) = rates
+    holds = (s1 <= 0) & (s2 >= 0)
+    span = jnp.where(holds & (s2 > s1), s2 - s1, 1.0)
+    share = jnp.where(holds, jnp.where(s2 > s1, s2 / span, 0.5), 0.0)
+    share = jnp.where(holds, share, jnp.where(s2 >= 0, 1.0, 0.0))
+    slopes = before[1], share * v1 + (1 - share) * v2
+    total = _END[kind](approach, restitution, first, *slopes)
+    start = jnp.minimum(first, total)
+    rest = total - start
+    positive = jnp.where(side > 0, start, 0.0) + share * rest
+    return Impulses(total, positive, total - positive)
+
+
+def _of_side(positive, rates: Rates):
+    return tuple(jnp.where(positive, a, b) for a, b in zip(*rates, strict=True))
+
+
+def _reaching(velocity, approach, first, slope, later):
+    """Return the impulse at which the normal velocity reaches a value."""
+    change = velocity - approach
+    # the first slope may be negative: then only the second phase ends the approach
+    early = jnp.where(slope > 0, change / jnp.where(slope > 0, slope, 1.0), jnp.inf)
+    reached = jnp.where(jnp.isfinite(first), first, 0.0)
+    late = reached + (change - slope * reached) / later
+    return jnp.where(early <= first, early, late)
+
+
+def _kinematic(approach, restitution, first, slope, later):
+    return _reaching(-restitution * approach, approach, first, slope, later)
+
+
+def _kinetic(approach, restitution, first, slope, later):
+    stopped = _reaching(0.0 * approach, approach, first, slope, later)
+    return (1 + restitution) * stopped
+
+
+def _energetic(approach, restitution, first, slope, later):
+    """The work of the normal force in restitution is e^2 times that in compression."""
+    stopped = _reaching(0.0 * approach, approach, first, slope, later)
+    bounded = jnp.isfinite(first)
+    reached = jnp.where(bounded, first, 0.0)
+    # does the first phase last beyond compression?
+    lasts = first >= stopped
+    rate = jnp.where(lasts, slope, 1.0)
+    between = approach + slope * reached
+    # twice the work in compression, and what is wanted in restitution
+    two = between**2 / later - (approach + between) * reached
+    wanted = restitution**2 * jnp.where(lasts, approach**2 / rate, two)
+    # in restitution, the first phase adds this impulse, at most
+    ahead = jnp.where(lasts & bounded, reached - stopped, 0.0)
+    most = rate * ahead**2
+    alone = lasts & (~bounded | (wanted <= most))
+    speed = jnp.where(lasts, rate * ahead, 0.0)
+    end = _root(speed**2 + later * jnp.where(alone, 0.0, wanted - most))
+    return stopped + jnp.where(
+        alone, _root(wanted / rate), ahead + (end - speed) / later
+    )
+
+
+def _root(square):
+    """Return a square root with a finite derivative at zero."""
+    positive = square > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
+
+
+_END = {"kinematic": _kinematic, "kinetic": _kinetic, "energetic": _energetic}
