@@ -18,8 +18,8 @@ _COST, _UNUSUAL = 3.0, 3.0
 _QUARTILE = 0.75
 # An impact is accepted if it explains at least this part of the excess cost
 _EXPLAINED = 0.5
-# An impact is rejected this close (s) to another: a soft contact also bends the motion
-_NEAR = 0.01
+# or this part, if another impact is this close (s), as a soft contact bends the motion
+_COMPLETELY, _NEAR = 0.99, 0.01
 # Steps of a fit, which need not converge
 _STEPS = 12
 # Number of rounds; each finds at most one impact in a piece
@@ -131,11 +131,11 @@ def _explained(
     bounds = [one for flight in part.flights for one in (flight.start, flight.stop)]
     times = np.unique([one.time for one in bounds if one.kind != "end of record"])
     inside = (times > span[0]) & (times < span[1])
-    if np.any(np.diff(times)[inside[1:] | inside[:-1]] < _NEAR):
-        return False
+    near = np.any(np.diff(times)[inside[1:] | inside[:-1]] < _NEAR)
+    part_explained = _COMPLETELY if near else _EXPLAINED
 
     def excess(misfits: _Misfits) -> float:
         here = (misfits.stop > span[0]) & (misfits.start < span[1])
         return float(np.sum(misfits.excess[here]))
 
-    return excess(after) < (1 - _EXPLAINED) * excess(before)
+    return excess(after) < (1 - part_explained) * excess(before)

@@ -93,7 +93,8 @@ def cut(
         boundaries[place] = _end(motion, place, "the recording ends here")
 
     left = {last for _, last in stretches}
-    flights = [_flight(sides, span, boundaries, left) for span in spans]
+    empty = [span for span in doubted if not any(span[0] < m < span[1] for m in marks)]
+    flights = [_flight(sides, span, boundaries, left, empty) for span in spans]
     contacts = [
         _contact(motion, span, boundaries, flights, restitution) for span in stretches
     ]
@@ -268,19 +269,33 @@ def _still_near(time: float, latest: float) -> Boundary:
     return Boundary(min(time, latest), WINDOW / 2, "impact", evidence)
 
 
-def _flight(sides, span, boundaries, left: set[int]) -> Flight:
+def _flight(sides, span, boundaries, left: set[int], doubted) -> Flight:
     motion = sides[0]
     clear = [clear_of_end(side, span) for side in sides]
+    clear.append(_clear_of(doubted, span, len(motion.time)))
     first, last = max(a for a, _ in clear), min(b for _, b in clear)
     start, stop = (boundaries[place] for place in span)
     hidden = "an impact may hide between here and the end of the recording"
-    start = start if first == span[0] else _end(motion, first, hidden)
+    start = start if first == span[0] else _end(motion, min(first, last - 1), hidden)
     stop = stop if last == span[1] else _end(motion, last - 1, hidden)
-    height = float(np.max(motion.gap[first:last]))
+    height = float(np.max(motion.gap[first:last], initial=0.0))
     # the threshold is exceeded long after release: these samples belong to the flight
     begin = int(np.searchsorted(motion.time, start.time))
     first = begin if span[0] in left and start is boundaries[span[0]] else first
     return Flight(start, stop, first, last, height)
+
+
+def _clear_of(doubted: Sequence[Span], span: Span, count: int) -> Span:
+    """Return the samples of a flight without doubted stretches at the ends of the
+    recording, which are too short to show an impact.
+    """
+    first, last = span
+    for a, b in doubted:
+        if a <= first == 0:
+            first = min(b, last)
+        if b >= count - 1 and last == count:
+            last = max(a, first)
+    return first, last
 
 
 def _end(motion: Motion, place: int, why: str) -> Boundary:
