@@ -175,7 +175,9 @@ def _ending(
     """
     if not functions.m:
         return _Ending(no_rest(impact), jnp.asarray(False), [], [])
-    chatter = rest_of_chatter(functions, plan, impact, speeds, jets, mode, end.stop)
+    chatter = rest_of_chatter(
+        functions, plan, impact, speeds, jets, mode, end.stop, rounding
+    )
     # far enough into the sequence, or so low that rounding hides the next flight: its
     # height is v^2 / 2a, and below 250 times the rounding, it is hidden
     deep = impact.rebound <= plan.depth * fastest

@@ -31,11 +31,14 @@ class Impact(NamedTuple):
     constraint: Any
 
 
-def rest_of_chatter(functions, plan, impact: Impact, speeds, jets, mode, stop) -> Rest:
+def rest_of_chatter(
+    functions, plan, impact: Impact, speeds, jets, mode, stop, rounding
+) -> Rest:
     """Complete the chatter after an impact; return whether the completion is valid.
 
     **Arguments:** the normal `speeds` before the impact, the `jets` after it and the
-    `mode` then, and the time (s) of the next `stop` of the run.
+    `mode` then, the time (s) of the next `stop` of the run, and the `rounding` of each
+    gap and switching function.
     """
     t, before, after, approach, rebound, constraint = impact
     dampings, restitutions, states = functions.chatter(t, before, after, mode)
@@ -68,6 +71,9 @@ def rest_of_chatter(functions, plan, impact: Impact, speeds, jets, mode, stop) -
         strongest = jnp.minimum(jet.acceleration, mean)
         left = jet.gap + duration * (jet.velocity + duration * strongest / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
+        if k >= functions.m:
+            # a slip that friction has stopped
+            clear = clear | (jet.gap <= rounding[k])
         possible = possible & clear
     return Rest(possible, duration, state, a, rate)
 

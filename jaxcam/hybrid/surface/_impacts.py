@@ -83,20 +83,36 @@ def _with_friction(
     """Add the impulses of friction to frictionless impacts, and change those in the
     normal direction accordingly.
     """
-    sides, directions = sides_of(system, t, x), normal_directions(system, t, x)
-    approach = normal_velocity(system, t, x)
+    sides, limits = sides_of(system, t, x), normal_directions(system, t, x)
+    before = normal_velocity(system, t, x)
     kind = restitution_kind(system)
     rows = []
     for k, row in enumerate(after):
-        rebound = normal_velocity(system, t, row)[k]
-        moving = jnp.where(approach[k] < 0, approach[k], -1.0)
-        coefficient = jnp.where(approach[k] < 0, -rebound / moving, 0.0)
-        one = _one_contact(system, t, x, k, sides, directions[k])
-        found = impulses(one.side, one.slip, approach[k], coefficient, one.rates, kind)
-        more = found.total - (rebound - approach[k])
+        approach, rebound = before[k], normal_velocity(system, t, row)[k]
+        # direction and coefficient follow from the frictionless impact; at rest, they
+        # are limits
+        moves = approach < 0
+        impulse = jnp.where(moves, rebound - approach, 1.0)
+        direction = jnp.where(moves, (row - x) / impulse, limits[k])
+        coefficient = jnp.where(
+            moves,
+            -rebound / jnp.where(moves, approach, -1.0),
+            _slow_coefficient(system, t, x, k, direction),
+        )
+        one = _one_contact(system, t, x, k, sides, direction)
+        found = impulses(one.side, one.slip, approach, coefficient, one.rates, kind)
         friction = found.positive * one.positive + found.negative * one.negative
-        rows.append(row + more * directions[k] + friction)
+        rows.append(x + found.total * direction + friction)
     return jnp.stack(rows)
+
+
+def _slow_coefficient(system, t, x, k: int, direction):
+    """Return the limit of the coefficient of restitution without friction."""
+
+    def frictionless(y):
+        return normal_velocity(system, t, jnp.atleast_2d(system.impact(t, y))[k])[k]
+
+    return -jax.jvp(frictionless, (x,), (direction,))[1]
 
 
 class _Contact(NamedTuple):
