@@ -203,7 +203,9 @@ def test_the_derivatives_of_a_falling_rod():
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_ball_that_grips_in_an_impact_comes_to_rest_rolling(restitution):
     """It rolls with 5/7 of its velocity from the first impact on, to 1e-11."""
-    ball = SpinningBall(restitution=restitution, friction_coefficient=0.5)
+    ball = SpinningBall(
+        restitution=jnp.asarray(restitution), friction_coefficient=jnp.asarray(0.5)
+    )
     run = jaxcam.simulate(ball, [0.0, 1.0, 0.5, 0.0, 0.0], 0.0, 3.0)
     assert run.successful, run.result
     assert int(run.contacts.count) == 1

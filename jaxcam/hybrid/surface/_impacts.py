@@ -131,7 +131,7 @@ def _one_contact(system, t, x, k: int, sides, direction) -> _Contact:
     """Find the switching function on which the friction of constraint `k` depends."""
     same = friction_on(system, t, x, sides)[k]
     # without one, friction never changes
-    found = jnp.asarray(1.0), jnp.asarray(jnp.inf), same, same
+    found: tuple = jnp.asarray(1.0), jnp.asarray(jnp.inf), same, same
     place = jnp.asarray(0)
     for j in reversed(range(len(sides))):
         both = [
@@ -147,7 +147,11 @@ def _one_contact(system, t, x, k: int, sides, direction) -> _Contact:
         slips = surfaces_of(system, t, y)
         return slips[place], normal_velocity(system, t, y)[k]
 
+    side, slip, positive, negative = found
     rates = Rates(
-        *(jax.jvp(velocities, (x,), (direction + part,))[1] for part in found[2:])
+        *(
+            jax.jvp(velocities, (x,), (direction + part,))[1]
+            for part in (positive, negative)
+        )
     )
-    return _Contact(*found, rates)
+    return _Contact(side, slip, positive, negative, rates)
