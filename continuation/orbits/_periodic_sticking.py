@@ -82,7 +82,7 @@ class StickingOrbits(AbstractProblem):
     periods: int = eqx.field(static=True, default=1)
     """Number n of forcing periods from release to the next release after contact."""
     beyond: bool = eqx.field(static=True, default=False)
-    """Whether to continue beyond an interruption; otherwise, it ends the branch."""
+    """Whether to continue beyond an interruption; otherwise, the branch ends there."""
 
     def residual(self, u, parameters) -> Float[Array, "3"]:
         system = parameters.prepared()

@@ -54,15 +54,16 @@ def event_causes(
     policy: Policy = Policy(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[EventCause, ...]:
-    """Rank terms by their fit to the observed event speeds of a rig.
+    """Rank terms by their fit to the speeds at which the type of motion changes.
 
     Each term is tried alone. Four speeds hardly distinguish between terms: those whose
     misfit is within a few units of the smallest are equally good.
 
     Args:
         rig: The rig.
-        observed: Valve float, fold and flip of P(1,1) and interruption of chatter
-            (rad/s); NaN for a speed that was not observed.
+        observed: Observed speeds of detachment (valve float), of the fold and the flip
+            of P(1,1), and of the interruption of chatter (rad/s); NaN for a speed that
+            was not observed.
         errors: Standard error of each speed.
         terms: Candidate terms, each with one strength.
         where: Selects the parameter of the rig that is fitted together with each term,

@@ -119,8 +119,8 @@ class SwitchedSystem(HybridSystem):
     def holding(self) -> Any:
         """Return the ratio of static to kinetic friction at each surface.
 
-        It is the factor by which the limit of the force during sliding exceeds that of
-        the branches: at least one, a number or of shape `(k,)`; default: one.
+        It is the limit of the friction force at zero slip divided by the friction force
+        in the branches: at least one, a number or of shape `(k,)`; default: one.
         """
         return 1.0
 
@@ -130,13 +130,13 @@ class SwitchedSystem(HybridSystem):
         """Return the friction of each contact, per unit of its normal force: none by
         default.
 
-        While a constraint is in contact, its force changes the rates of the state by
-        its multiple of the impulse direction plus this vector. For a body of
+        While a constraint is in contact, each unit of its normal force adds the impulse
+        direction plus this vector to the rates of the state. For a body with friction
         coefficient mu that slides along x, whose slip velocity is the first switching
-        function, only the rate of the velocity along x is not zero:
-        `-mu * sides[0]`. At zero slip the body sticks while the force that this takes
-        is less than mu times the normal force. `impact` is then the law without
-        friction: the impulse of friction, at most what stops the slip, is added to it.
+        function, only the rate of the velocity along x is not zero: `-mu * sides[0]`.
+        At zero slip the body sticks as long as the required friction force is less than
+        mu times the normal force. `impact` is then the law without friction; the
+        friction impulse, which is at most the one that stops the slip, is added.
 
         Args:
             t: Time (s).
