@@ -137,9 +137,9 @@ def functions_tie(name: str, rival: Rival) -> Caveat:
     """Caveat: another function, or another form, explains about as much."""
     return Caveat(
         Reason.TIE,
-        f"These recordings do not distinguish it from {name}, which would be chosen "
-        f"in {rival.share:.0%} of the bootstrap samples. Record motions that visit "
-        "more of the states in which the two differ.",
+        f"These recordings do not distinguish the function from {name}, which would "
+        f"be chosen in {rival.share:.0%} of the bootstrap samples. Record motions that "
+        "visit more of the states in which the two differ.",
         tuple(sorted(rival.missing.names)),
     )
 
@@ -148,9 +148,9 @@ def decoy_explains(share: float) -> Caveat:
     """Caveat: a function that acts at the wrong times explains much as well."""
     return Caveat(
         Reason.DECOY,
-        "The same function evaluated along the time-reversed motion would explain "
-        f"{share:.0%} of what it explains, so these recordings hardly show when "
-        "the force acts. Record less periodic motions.",
+        "Evaluated along the time-reversed motion, the function would explain "
+        f"{share:.0%} of what it explains along the measured motion, so these "
+        "recordings hardly show when the force acts. Record less periodic motions.",
     )
 
 

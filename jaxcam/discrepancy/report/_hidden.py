@@ -132,18 +132,18 @@ def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) 
         )
     if isinstance(element, Relaxation):
         return (
-            f"a force with memory: it resists a deflection and relaxes over {said} s, "
-            "like rubber, or a spring and a dashpot in series"
+            "a force with an internal state: it resists a deflection and relaxes over "
+            f"{said} s, like rubber, or a spring and a dashpot in series"
         )
     assert isinstance(element, Hysteresis)
     if element.loading < 0:
         return (
-            "a force with memory: its stiffness increases with the force, and more "
-            f"during unloading than during loading (hysteresis, over about "
+            "a force with an internal state: its stiffness increases with the force, "
+            "and more during unloading than during loading (hysteresis, over about "
             f"{quantity(said, unit)})"
         )
     return (
-        "a force with memory: from each reversal it is elastic over about "
+        "a force with an internal state: from each reversal it is elastic over about "
         f"{quantity(said, unit)} and then slips (hysteresis), like a bolted joint or "
         "a wire rope"
     )
