@@ -13,7 +13,7 @@
 # released, so every revolution is the same. Above this speed the release comes before
 # the chatter is complete. There is no more sticking, and the motion becomes chaotic at
 # once, without a period doubling. `docs/chatter.md` explains the theory; this notebook
-# draws it.
+# draws its maps.
 
 # +
 import equinox as eqx
