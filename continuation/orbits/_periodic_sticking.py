@@ -119,8 +119,8 @@ class StickingOrbits(AbstractProblem):
 
     def monitors(self) -> Mapping[str, Monitor]:
         return {
-            CHATTER: Monitor("interruption of chattering", ends=True, bracket=True),
-            DETACHMENT: Monitor("beginning of impacts", ends=True),
+            CHATTER: Monitor("interruption of chatter", ends=True, bracket=True),
+            DETACHMENT: Monitor("detachment", ends=True),
         }
 
     def seen(self, u, parameters):
