@@ -29,13 +29,13 @@ class Batch:
     """
 
     states: np.ndarray
-    """States, shape `(lanes, points, n)`."""
+    """States, shape `(branches, points, n)`."""
     parameters: np.ndarray
-    """Parameter values, shape `(lanes, points)`."""
+    """Parameter values, shape `(branches, points)`."""
     multipliers: np.ndarray
-    """Eigenvalues or multipliers, shape `(lanes, points, k)`."""
+    """Eigenvalues or multipliers, shape `(branches, points, k)`."""
     count: np.ndarray
-    """Number of points of each branch, shape `(lanes,)`."""
+    """Number of points of each branch, shape `(branches,)`."""
     reasons: tuple[str, ...]
     """Reason for the end of each branch, one sentence each."""
     name: str

@@ -27,7 +27,7 @@ class LyapunovSpectrum(eqx.Module):
     """Lyapunov exponents (1/s), with one set per motion if there are several."""
 
     exponents: Float[Array, "*lanes n"]
-    """Exponents, largest first, shape `(n,)` or `(lanes, n)`."""
+    """Exponents, largest first, shape `(n,)` or `(motions, n)`."""
     stderr: Float[Array, "*lanes n"]
     """Standard error of each exponent, from the scatter of blocks of consecutive
     periods.

@@ -23,7 +23,7 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class EventCause:
-    """One explanation of the observed event speeds."""
+    """One explanation of the observed speeds."""
 
     name: str
     """Name of the term, or `"none"`."""
@@ -34,7 +34,7 @@ class EventCause:
     beside: float
     """Value of the rig parameter that was fitted together with the strength."""
     speeds: Float[np.ndarray, "4"]
-    """Speeds (rad/s), shape `(4,)`: valve float, fold and flip of P(1,1), interruption
+    """Speeds (rad/s), shape `(4,)`: detachment, fold and flip of P(1,1), interruption
     of chatter; NaN if there is none.
     """
     misfit: float

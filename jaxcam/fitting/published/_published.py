@@ -1,6 +1,6 @@
-"""Fit parameters to printed numbers instead of recordings.
+"""Fit parameters to published values instead of recordings.
 
-The data are published numbers (multipliers, positions, speeds, bifurcation points). The
+The data are published values (multipliers, positions, speeds, bifurcation points). The
 model is a differentiable function that computes them, and nominal values with
 tolerances are the prior:
 
