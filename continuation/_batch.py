@@ -29,13 +29,13 @@ class Batch:
     """
 
     states: np.ndarray
-    """States, shape `(lanes, points, n)`."""
+    """States, shape `(branches, points, n)`."""
     parameters: np.ndarray
-    """Parameter values, shape `(lanes, points)`."""
+    """Parameter values, shape `(branches, points)`."""
     multipliers: np.ndarray
-    """Eigenvalues or multipliers, shape `(lanes, points, k)`."""
+    """Eigenvalues or multipliers, shape `(branches, points, k)`."""
     count: np.ndarray
-    """Number of points of each branch, shape `(lanes,)`."""
+    """Number of points of each branch, shape `(branches,)`."""
     reasons: tuple[str, ...]
     """Reason for the end of each branch, one sentence each."""
     name: str
@@ -129,15 +129,15 @@ def follow_batch(
 
     Args:
         problem: The problem.
-        states: Initial states, shape `(lanes, n)`, one row per branch.
+        states: Initial states, shape `(branches, n)`, one row per branch.
         where: As for [`continuation.follow`][].
         bounds: As for [`continuation.follow`][].
         algorithm: Algorithm that corrects in a plane and predicts from a single point,
             for example along the tangent; default: [`continuation.PseudoArclength`][].
-        parameters: Parameters of the problem; each float leaf has shape `(lanes,)` or
-            is a scalar for all branches. Default: those of the problem.
+        parameters: Parameters of the problem; each float leaf has shape `(branches,)`
+            or is a scalar for all branches. Default: those of the problem.
         settings: As for [`continuation.follow`][].
-        direction: 1 or -1, or one of these for each branch, shape `(lanes,)`.
+        direction: 1 or -1, or one of these for each branch, shape `(branches,)`.
         points: Maximum number of points on each branch.
         progress: Called with the fraction of points completed; a branch that has ended
             counts as complete.

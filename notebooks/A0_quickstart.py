@@ -30,9 +30,9 @@ from jaxcam.plotting import phase_portrait, style, time_history
 # ## The system
 #
 # The state consists of the two displacements and the two velocities. All quantities are
-# dimensionless: mass 1 and the stiffness of each spring are one. Mass 1 is connected to
-# the frame and to mass 2. The stops are at `stop_1` and `stop_2`; each has a gap and a
-# row in the result of `impact`.
+# dimensionless: the first mass and the stiffness of each spring are equal to one. The
+# first mass is connected to the frame and to the second mass. The stops are at `stop_1`
+# and `stop_2`; each has a gap and a row in the result of `impact`.
 
 
 class TwoMasses(jaxcam.HybridSystem):

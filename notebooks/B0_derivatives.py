@@ -94,7 +94,7 @@ assert jnp.allclose(backward(ball), exact[0], rtol=1e-9)
 # ## Through sticking and a release
 #
 # At 130 rpm the follower detaches from its cam once per revolution, chatters, and
-# sticks again. While it sticks, it follows the cam and loses memory of its past.
+# sticks again. While it sticks, the cam alone determines its motion.
 
 # +
 rig = CamFollower(speed=jnp.asarray(rpm_to_rad_s(130.0)))

@@ -65,8 +65,8 @@ for point in family.special:
     )
 # -
 
-# Flight is conservative, so the product of the two multipliers of every orbit on the
-# branch is r squared. Table 5.2 of the thesis lists ten such pairs. The restitution
+# Free flight is conservative, so the product of the two multipliers of every orbit on
+# the branch is r squared. Table 5.2 of the thesis lists ten such pairs. The restitution
 # law, which the thesis does not give, was recovered from them.
 
 # +

@@ -13,7 +13,7 @@
 # released, so every revolution is the same. Above this speed the release comes before
 # the chatter is complete. There is no more sticking, and the motion becomes chaotic at
 # once, without a period doubling. `docs/chatter.md` explains the theory; this notebook
-# draws it.
+# draws its maps.
 
 # +
 import equinox as eqx
@@ -50,8 +50,8 @@ rig = preset("calibrated")
 # ## The interruption of chatter
 #
 # At the interruption, the impacts accumulate exactly at the release. The sticking time
-# falls to zero as a power of the distance in speed, so ordinary root finders fail on
-# it. Instead we find the zero of a smooth margin.
+# falls to zero as a power of the distance in speed, so ordinary root finders fail.
+# Instead we find the zero of a smooth margin.
 
 bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
 critical = continuation.chatter_interruption(rig, speed, bracket)

@@ -10,10 +10,10 @@
 #
 # The package contains three recordings, each of four seconds, of a cam-follower rig
 # with noisy encoders at three speeds. We fit the parameters of the spring, the cam and
-# the restitution, determine what the recordings cannot reveal, and see how reliable
-# standard errors are if the model lacks an effect. (The recordings were simulated by
-# code that is independent of the fit, so the true values are known. The simulated rig
-# has friction in its hinge.)
+# the restitution, find the parameters that the recordings cannot determine, and see how
+# reliable the standard errors are if the model lacks an effect. (The recordings were
+# simulated by code that is independent of the fit, so the true values are known. The
+# simulated rig has friction in its hinge.)
 
 # +
 import jax.numpy as jnp
@@ -101,8 +101,9 @@ print("residual / noise, before and after the fit:", left(before), left(found))
 # The residual exceeds the noise in every recording, and in one it is four times the
 # noise, so the model lacks an effect. The standard errors take only the noise into
 # account and are too small. The bootstrap, which gives the flights random weights,
-# shows this for some parameters. But neither error reveals that a parameter has
-# absorbed part of the missing effect, as the parameters of the spring have here.
+# shows this for some parameters. But neither kind of standard error reveals that a
+# parameter has absorbed part of the missing effect, as the parameters of the spring
+# have here.
 
 # ## With friction in the hinge
 

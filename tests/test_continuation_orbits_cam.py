@@ -120,9 +120,9 @@ def test_orbit_that_sticks_from_its_beginning_to_its_interruption():
         start.problem, start, speed, bounds(115.0, 160.0), direction="both"
     )
     first, last = branch.special
-    assert first.kind == "beginning of impacts" and first.converged
+    assert first.kind == "detachment" and first.converged
     assert abs(rad_s_to_rpm(first.parameter) - detachment()) < 1e-6
-    assert last.kind == "interruption of chattering" and last.converged
+    assert last.kind == "interruption of chatter" and last.converged
     assert abs(rad_s_to_rpm(last.parameter) - 152.67658) < 0.04
     direct = continuation.chatter_interruption(system, speed, bounds(150.0, 155.0))
     assert abs(float(direct) - last.parameter) < 1e-9

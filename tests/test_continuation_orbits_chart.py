@@ -2,7 +2,7 @@
 
 Each curve is compared with something that shares nothing with path following: orbits
 with Runge-Kutta runs of SciPy, interruptions with a bracketed search along the speed
-alone, the beginning of impacts with the acceleration that contact suppresses.
+alone, detachment with the acceleration that contact suppresses.
 """
 
 import equinox as eqx
@@ -135,8 +135,8 @@ def test_special_points_at_the_restitution_of_the_thesis(special):
     assert all(point.converged for point in special.values())
     assert abs(found["fold"] - 135.947) < 0.01
     assert 151.8 < found["flip"] < 151.9
-    assert abs(found["interruption of chattering"] - 152.67658) < 0.04
-    assert abs(found["beginning of impacts"] - 125.0) < 0.2
+    assert abs(found["interruption of chatter"] - 152.67658) < 0.04
+    assert abs(found["detachment"] - 125.0) < 0.2
 
 
 def test_every_curve_crosses_the_chart(chart):
@@ -197,7 +197,7 @@ def test_grazing_orbits_touch_the_cam_in_another_integrator(chart):
 
 
 def test_interruptions_are_those_of_a_search_along_the_speed(chart):
-    for point in chart["interruption of chattering"].points[::4]:
+    for point in chart["interruption of chatter"].points[::4]:
         value, offset = point.parameters
         near = (value - 0.01, value + 0.01)
         direct = continuation.chatter_interruption(rig(150.0, offset), speed, near)
@@ -205,7 +205,7 @@ def test_interruptions_are_those_of_a_search_along_the_speed(chart):
 
 
 def test_impacts_begin_where_contact_stops_pulling(chart):
-    curve = chart["beginning of impacts"]
+    curve = chart["detachment"]
     # the law of impacts plays no part in it
     assert np.ptp([point.parameters[0] for point in curve.points]) < 1e-10
     system = system_at(curve.points[0])

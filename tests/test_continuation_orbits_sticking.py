@@ -63,7 +63,7 @@ def test_sticks_every_second_period_between_two_interruptions():
             assert point.signature == "sticks once in 2 periods"
             assert float(point.observed["sticking time"]) > 0
     for point, bracket in ((ends[-1], (2.96, 2.99)), (ends[1], (3.19, 3.24))):
-        assert point.kind == "interruption of chattering" and point.converged
+        assert point.kind == "interruption of chatter" and point.converged
         direct = continuation.chatter_interruption(system, omega, bracket, periods=2)
         assert abs(float(direct) - point.parameter) < 1e-9
 
@@ -77,7 +77,7 @@ def test_branch_goes_on_behind_the_interruption_with_ever_fewer_impacts():
         if later > 4 or len(points) > 100:
             break
     special = [point for point in points if point.special]
-    kinds = ["interruption of chattering", "fold", "grazing"]
+    kinds = ["interruption of chatter", "fold", "grazing"]
     assert [p.kind for p in special] == kinds
     assert all(p.converged for p in special)
     (taken,) = [p for p in points if "continued with" in p.reason]
@@ -116,7 +116,7 @@ def test_cam_follower_sticks_every_third_period():
         ):
             if point.special:
                 break
-        assert point is not None and point.kind == "interruption of chattering"
+        assert point is not None and point.kind == "interruption of chatter"
         assert point.converged
         inside = 1e-3 * direction
         rpm = float(rad_s_to_rpm(point.parameter))

@@ -224,7 +224,7 @@ def test_a_force_that_no_term_has_is_unknown():
     assert found.effects[0].name == "unknown"
     assert found.effects[0].where == "flight"
     shapes = {one.name: one for one in found.left_before}
-    assert shapes["force_of_angle"].significant
+    assert shapes["force_of_position"].significant
     # it is modelled, up to what the spring of the system can do as well
     (function,) = found.missing
     assert function.kind == "force"

@@ -33,7 +33,7 @@ def _residuals(name):
 def _diagnosis(verdict, effects):
     grid = np.linspace(0.1, 0.4, 8)
     shape = Structure(
-        "force_of_angle",
+        "force_of_position",
         "a force that depends on the position",
         "flight",
         "in flight",

@@ -220,7 +220,7 @@ def test_free_friction_changes_sign_at_the_speed_of_the_rig():
         1.0,
         references=References(free_slip_speed=0.2),
     )
-    friction = next(one for one in offered if one.name == "friction_of_angle")
+    friction = next(one for one in offered if one.name == "friction_of_position")
     friction = dataclasses.replace(friction, coefficients=(1.0, 0.0, 0.0))
     force = friction.acceleration(Motion(0.0, 0.5, 0.2, 0.0))
     assert float(force) == pytest.approx(-np.tanh(1.0), rel=1e-12)

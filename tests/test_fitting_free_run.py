@@ -147,7 +147,7 @@ def test_what_cannot_be_run_is_refused():
     turned = Model(
         Cart(), {"position_m": Sensor(0, noise=1.0)}, Turning(_force, _force)
     )
-    with pytest.raises(ValueError, match="turning drive"):
+    with pytest.raises(ValueError, match="rotating drive"):
         free_run(turned, run)
     with pytest.raises(RecordingError, match="no channel `force_N`"):
         free_run(model(), Recording("bare", run.time, {"position_m": force}))

@@ -279,7 +279,7 @@ def test_restitution_from_every_impact():
     [
         ([0.6, 0.8], "only their ratio matters"),
         ([0.6, -0.8], "only their product matters"),
-        ([0.8, 0.6], "raising K and J together: this"),
+        ([0.8, 0.6], "increasing K and J together; the"),
     ],
 )
 def test_a_pair_that_is_seen_only_together(direction, words):

@@ -1,4 +1,4 @@
-"""Grazing and interruption of chattering as printed numbers, against closed forms.
+"""Grazing and interruption of chatter as published values, against closed forms.
 
 Without impacts x'' + 2 z x' + x = cos(w t) moves with the amplitude
 1 / sqrt((1 - w^2)^2 + 4 z^2 w^2), so it touches a wall at d where

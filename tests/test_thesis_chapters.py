@@ -175,7 +175,7 @@ def test_local_map_and_reconstructions(calibrated):
 @pytest.mark.slow
 def test_branches_through_interruption_and_fold(calibrated):
     sticking = found("figure-3.9", calibrated)["computed"]
-    assert abs(sticking["interruption of chattering"] - 152.67658) < 0.04
+    assert abs(sticking["interruption of chatter"] - 152.67658) < 0.04
     fold = found("figure-3.12", calibrated)["computed"]
     assert abs(fold["fold"] - 135.947) < 0.01
     assert fold["saddles followed beyond the fold, to"] > 136.5

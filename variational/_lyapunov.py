@@ -27,7 +27,7 @@ class LyapunovSpectrum(eqx.Module):
     """Lyapunov exponents (1/s), with one set per motion if there are several."""
 
     exponents: Float[Array, "*lanes n"]
-    """Exponents, largest first, shape `(n,)` or `(lanes, n)`."""
+    """Exponents, largest first, shape `(n,)` or `(motions, n)`."""
     stderr: Float[Array, "*lanes n"]
     """Standard error of each exponent, from the scatter of blocks of consecutive
     periods.
@@ -79,13 +79,13 @@ def lyapunov_spectrum(
 
     Args:
         system: The system.
-        state: Initial state, shape `(n,)`, or `(lanes, n)` for many motions at once.
+        state: Initial state, shape `(n,)`, or `(motions, n)` for many motions at once.
         turns: Number of periods to average over, after the transient.
         t0: Start time (s).
         transient: Number of periods before the average.
         turn: Length of a period (s); default: the forcing period.
         where: Selects the parameter that differs between motions.
-        values: Value of that parameter in each motion, shape `(lanes,)`.
+        values: Value of that parameter in each motion, shape `(motions,)`.
         settings: Accuracy of the simulation; the default tolerance is 1e-12.
         blocks: Number of blocks for the standard error.
         max_steps: Maximum number of attempted steps per motion, or per period if the

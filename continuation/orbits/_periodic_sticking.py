@@ -82,7 +82,7 @@ class StickingOrbits(AbstractProblem):
     periods: int = eqx.field(static=True, default=1)
     """Number n of forcing periods from release to the next release after contact."""
     beyond: bool = eqx.field(static=True, default=False)
-    """Whether to continue beyond an interruption; otherwise, it ends the branch."""
+    """Whether to continue beyond an interruption; otherwise, the branch ends there."""
 
     def residual(self, u, parameters) -> Float[Array, "3"]:
         system = parameters.prepared()
@@ -119,8 +119,8 @@ class StickingOrbits(AbstractProblem):
 
     def monitors(self) -> Mapping[str, Monitor]:
         return {
-            CHATTER: Monitor("interruption of chattering", ends=True, bracket=True),
-            DETACHMENT: Monitor("beginning of impacts", ends=True),
+            CHATTER: Monitor("interruption of chatter", ends=True, bracket=True),
+            DETACHMENT: Monitor("detachment", ends=True),
         }
 
     def seen(self, u, parameters):

@@ -21,7 +21,7 @@ def intercept(s):
 # speed (rpm), a state near the orbit, and the kinds of point at which its branch ends
 orbits = [
     (145.0, [0.4245, 1.8281], ("fold", "flip")),
-    (145.0, None, ("beginning of impacts", "interruption of chattering")),
+    (145.0, None, ("detachment", "interruption of chatter")),
     (152.69, [0.3383, 0.2427], ("grazing",)),
 ]
 bounds = ((rpm_to_rad_s(120.0), rpm_to_rad_s(165.0)), (-0.66, -0.58))

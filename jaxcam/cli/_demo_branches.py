@@ -31,7 +31,7 @@ _CAPTION = (
 
 def _interrupted(point) -> bool:
     """Find the interruption of chatter of the sticking orbit."""
-    return point.kind == "interruption of chattering"
+    return point.kind == "interruption of chatter"
 
 
 def follow_branches(folder: Path) -> Branches:

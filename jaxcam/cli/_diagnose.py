@@ -129,8 +129,11 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
         )
         outlook = Outlook(predicted)
     if propose and any(one.element is not None for one in found.missing):
-        words = "no recording is recommended, because a force with memory was found"
-        report(words, None)
+        report(
+            "no recording is recommended, because a force with an internal state was "
+            "found",
+            None,
+        )
     elif propose:
         proposed = discrepancy.next_experiments(
             found, nominal, seed=seed, progress=report

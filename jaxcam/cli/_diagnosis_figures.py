@@ -8,7 +8,7 @@ import numpy as np
 
 from ..discrepancy import Diagnosis
 from ..discrepancy.evidence import Structure
-from ..discrepancy.report import MissingFunction
+from ..discrepancy.report import MissingFunction, spelled
 from ..discrepancy.terms import Relaxation, Variable
 from ..fitting import Residuals
 from ._residual_axes import Along, residual_label, shown_in, title_of
@@ -217,7 +217,7 @@ def _shapes(plt, found: Diagnosis):
             _band(axis, after[name], IMPACT, "found")
         axis.axhline(0.0, color="k", lw=0.6)
         one = before[name]
-        axis.set_title(name.replace("_", " "), fontsize=11)
+        axis.set_title(spelled(name), fontsize=11)
         axis.set_xlabel(labelled(one.variable, unit_along(one.variable, found.unit)))
         axis.set_ylabel(labelled(one.quantity, one.unit.replace("^2", "²")))
         axis.xaxis.label.set_size(10)
@@ -244,7 +244,7 @@ def _ranking(plt, found: Diagnosis):
     ranked = found.alternatives[: found.policy.alternatives]
     pairs = [(one.name, one.delta_bic) for one in ranked] or [("none", 0.0)]
     figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
-    names = [name.replace("_", " ").replace("+", " + ") for name, _ in pairs]
+    names = [spelled(name).replace("+", " + ") for name, _ in pairs]
     # dots, not bars: a logarithmic axis has no zero for bars to start from
     for row, (_, delta) in enumerate(pairs):
         axis.plot(max(delta, 0.1), row, "o", color=FLIGHT)

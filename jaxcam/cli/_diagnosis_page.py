@@ -5,7 +5,7 @@ from html import escape
 from pathlib import Path
 
 from ..discrepancy import Diagnosis, Verdict
-from ..discrepancy.report import listed, number
+from ..discrepancy.report import listed, number, spelled
 from ..tables import scaled
 from ._outlook import Outlook
 from ._page import figure_html, sentences, STYLE, table_html
@@ -71,7 +71,7 @@ def _effects(found: Diagnosis) -> list[str]:
     )
     rows = [
         (
-            effect.name.replace("_", " "),
+            spelled(effect.name),
             ", ".join(
                 f"{name} = {number(v.value, v.stderr, v.unit)}"
                 for name, v in effect.parameters.items()
@@ -115,7 +115,7 @@ def _alternatives(found: Diagnosis) -> list[str]:
         return []
     rows = [
         (
-            one.name.replace("_", " ").replace("+", " + "),
+            spelled(one.name).replace("+", " + "),
             f"{one.delta_bic:+.3g}",
             one.reason,
         )
@@ -132,7 +132,7 @@ def _alternatives(found: Diagnosis) -> list[str]:
 def _left_over(found: Diagnosis) -> list[str]:
     rows = [
         (
-            one.name.replace("_", " "),
+            spelled(one.name),
             one.where,
             f"{one.gain:.1f}",
             f"{one.threshold:.1f}",
@@ -166,7 +166,7 @@ def _limits(found: Diagnosis) -> list[str]:
     rows = [
         (
             name,
-            f"{one.value:.2g} {'' if one.unit == '-' else one.unit}",
+            f"{one.value:.2g} {'' if one.unit == '-' else one.unit}".rstrip(),
             found.hides.get(name, "").replace("_", " "),
         )
         for name, one in found.limits.items()

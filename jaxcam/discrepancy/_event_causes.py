@@ -23,7 +23,7 @@ from .terms import Term, WithTerms
 
 @dataclasses.dataclass(frozen=True)
 class EventCause:
-    """One explanation of the observed event speeds."""
+    """One explanation of the observed speeds."""
 
     name: str
     """Name of the term, or `"none"`."""
@@ -34,7 +34,7 @@ class EventCause:
     beside: float
     """Value of the rig parameter that was fitted together with the strength."""
     speeds: Float[np.ndarray, "4"]
-    """Speeds (rad/s), shape `(4,)`: valve float, fold and flip of P(1,1), interruption
+    """Speeds (rad/s), shape `(4,)`: detachment, fold and flip of P(1,1), interruption
     of chatter; NaN if there is none.
     """
     misfit: float
@@ -54,15 +54,16 @@ def event_causes(
     policy: Policy = Policy(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[EventCause, ...]:
-    """Rank terms by their fit to the observed event speeds of a rig.
+    """Rank terms by their fit to the speeds at which the type of motion changes.
 
     Each term is tried alone. Four speeds hardly distinguish between terms: those whose
     misfit is within a few units of the smallest are equally good.
 
     Args:
         rig: The rig.
-        observed: Valve float, fold and flip of P(1,1) and interruption of chatter
-            (rad/s); NaN for a speed that was not observed.
+        observed: Observed speeds of detachment (valve float), of the fold and the flip
+            of P(1,1), and of the interruption of chatter (rad/s); NaN for a speed that
+            was not observed.
         errors: Standard error of each speed.
         terms: Candidate terms, each with one strength.
         where: Selects the parameter of the rig that is fitted together with each term,

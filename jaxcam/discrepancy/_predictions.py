@@ -55,11 +55,11 @@ def predictions(
     """Predict the speeds at which the motion of a cam-follower rig changes, with both
     models.
 
-    These are the speeds of valve float, of the fold and the flip of P(1,1), and of the
-    interruption of complete chatter. Their standard errors are estimated from random
-    rigs, drawn from the distribution of the fitted parameters. The second model
-    includes the named terms except those with a frequency of their own, because the
-    motion is then not periodic with the cam.
+    These are the speeds of detachment (valve float), of the fold and the flip of
+    P(1,1), and of the interruption of complete chatter. Their standard errors are
+    estimated from random rigs, drawn from the distribution of the fitted parameters.
+    The second model includes the named terms except those with a frequency of their
+    own, because the motion is then not periodic with the cam.
 
     Args:
         found: The diagnosis.

@@ -55,9 +55,10 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     done = "is excluded" if better else "is not explained by any of the terms tried"
     sentence = (
         f"The recording {name} {done}: with the model fitted to all recordings, its "
-        f"residual is {np.sqrt(costs[name]):.2g} times the noise, whereas that of "
-        f"every other recording is at most {np.sqrt(sorted(costs.values())[-2]):.2g} "
-        "times the noise. Check how it was recorded and read."
+        f"residual is {np.sqrt(costs[name]):.3g} times the noise, whereas that of "
+        "every other recording is at most "
+        f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. Check how "
+        f"{name} was recorded and read."
     )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

@@ -1,4 +1,4 @@
-"""Estimate parameters from recordings or from published numbers."""
+"""Estimate parameters from recordings or from published values."""
 
 from ._bootstrap import Bootstrap as Bootstrap, bootstrap as bootstrap
 from ._cam_follower import (

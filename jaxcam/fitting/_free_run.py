@@ -39,7 +39,7 @@ _UNEVEN = 0.01
 
 @dataclasses.dataclass(frozen=True)
 class FreeRun:
-    """A recording and the motion that a model predicts from its inputs alone."""
+    """A recording, and its prediction from the first samples and the input alone."""
 
     record: str
     """Name of the recording."""
@@ -89,7 +89,7 @@ def free_run(
 
     Raises:
         RecordingError: The recording is too short, unevenly sampled or lacks a channel.
-        ValueError: The model has a turning drive, or the motion meets a constraint or
+        ValueError: The model has a rotating drive, or the motion meets a constraint or
             does not stay finite.
 
     Examples:
@@ -162,7 +162,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
     run = recording.recording if isinstance(recording, Segments) else recording
     if isinstance(model.drive, Turning):
         raise ValueError(
-            "A free run follows a measured input; for a system with a turning drive, "
+            "A free run follows a measured input; for a system with a rotating drive, "
             "compare flights with `jaxcam.recordings.compare`."
         )
     model = with_constants(model, run)

@@ -68,8 +68,8 @@ class Identifiability:
         if not total:
             return ["There is nothing to fit."]
         found = [
-            f"The data determine {self.seen} of {total} combinations of parameters "
-            f"better than the tolerances do."
+            f"The data determine {self.seen} of {total} combinations of parameters to "
+            "within half their tolerance."
         ]
         dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]
         if dead:
@@ -106,15 +106,15 @@ class Identifiability:
         sign = np.sign(shares[members[0]])
         up = [n for n in members if shares[n] * sign > 0]
         down = [n for n in members if shares[n] * sign < 0]
-        what = f"raising {_listed(up)} together"
+        what = f"increasing {_listed(up)} together"
         if len(up) == 1:
-            what = f"raising {up[0]}"
+            what = f"increasing {up[0]}"
         if down:
-            what += f" while lowering {_listed(down)}"
+            what += f" while decreasing {_listed(down)}"
         what += self._relation(direction, members)
         return (
-            f"The data are almost insensitive to {what}: this combination is set by "
-            f"the tolerances."
+            f"The data are almost insensitive to {what}; the tolerances determine this "
+            "combination."
         )
 
     def _relation(self, direction, members) -> str:

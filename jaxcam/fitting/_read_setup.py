@@ -238,7 +238,7 @@ def _entries(section: Section) -> Iterator[tuple[str, None]]:
 
 
 def _phase_of(drive: Turning | Input | None) -> str | None:
-    """Return the phase field of a turning drive, which represents the encoder's
+    """Return the phase field of a rotating drive, which represents the encoder's
     zero.
     """
     if not isinstance(drive, Turning):

@@ -36,9 +36,9 @@ def segment_by_model(
     is zero where its velocity jumps, as far as the tolerances of the parameters allow.
     Without a gap, the whole recording is one flight.
 
-    If parameters are given, they are fitted to short pieces of the flights. Where the
-    model does not describe a piece, in contrast to most others, less significant
-    impacts are sought, and a flight that follows contact begins later.
+    If parameters are given, they are fitted to short pieces of the flights. If the
+    model describes most pieces but not one of them, impacts are sought in this piece
+    with a lower threshold, and a flight that follows contact begins later.
 
     Args:
         model: The model. State components count as measured if a sensor without a

@@ -30,7 +30,7 @@ class Setup:
     parameters: tuple[Parameter, ...] = ()
     """Parameters to fit, each within its tolerance."""
     drive_channel: str | None = None
-    """Channel of the encoder of a turning drive (rad), or `None`."""
+    """Channel of the encoder of a rotating drive (rad), or `None`."""
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Stated constants of missing-physics terms, by the names of the fields of
     `jaxcam.recordings.References`, in the units of the motion; the others follow from

@@ -119,8 +119,8 @@ class SwitchedSystem(HybridSystem):
     def holding(self) -> Any:
         """Return the ratio of static to kinetic friction at each surface.
 
-        It is the factor by which the limit of the force during sliding exceeds that of
-        the branches: at least one, a number or of shape `(k,)`; default: one.
+        It is the limit of the friction force at zero slip divided by the friction force
+        in the branches: at least one, a number or of shape `(k,)`; default: one.
         """
         return 1.0
 
@@ -143,15 +143,15 @@ class SwitchedSystem(HybridSystem):
         """Return the friction of each contact, per unit of its normal force: none by
         default.
 
-        While a constraint is in contact, its force changes the rates of the state by
-        its multiple of the impulse direction plus this vector. For a body of
+        While a constraint is in contact, each unit of its normal force adds the impulse
+        direction plus this vector to the rates of the state. For a body with friction
         coefficient mu that slides along x, whose slip velocity is the first switching
-        function, only the rate of the velocity along x is not zero:
-        `-mu * sides[0]`. At zero slip the body sticks while the force that this takes
-        is less than mu times the normal force. `impact` is then the law without
-        friction, from which the coefficient of restitution follows; `restitution_kind`
-        says how that is to be understood. During an impact, the body slips until
-        friction has stopped it; then it sticks, or slips back if friction is too weak.
+        function, only the rate of the velocity along x is not zero: `-mu * sides[0]`.
+        At zero slip the body sticks as long as the required friction force is less than
+        mu times the normal force. `impact` is then the law without friction, from which
+        the coefficient of restitution follows; `restitution_kind` determines its
+        meaning. During an impact, the body slips until friction has stopped it; then it
+        sticks, or slips back if friction is too weak.
 
         Args:
             t: Time (s).

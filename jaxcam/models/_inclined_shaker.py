@@ -16,7 +16,7 @@ from ._parameters import (
 
 
 class InclinedShaker(SwitchedSystem):
-    """A block that slides, sticks and hops on a vibrating inclined plane.
+    """A block that slides, sticks and bounces on a vibrating inclined plane.
 
     The plane moves by `amplitude sin(omega t)` at the angle `direction` to itself. The
     state is (downhill position, height, and their velocities), relative to the plane.

@@ -50,8 +50,8 @@ def simulate_through_joints(
     The run stops at every joint and continues with the next piece, so that each part is
     smooth. At a joint where the slope of the lift jumps up, a follower in contact has
     an impact; where it jumps down, the follower leaves the cam. The times of the joints
-    do not depend on the state, so a deviation passes them unchanged, and only impacts
-    have saltation matrices.
+    do not depend on the state, so a joint leaves a deviation unchanged, and only
+    impacts have saltation matrices.
 
     Args:
         system: A system whose `profile` is a [`jaxcam.models.MotionProgram`][].

@@ -1,4 +1,4 @@
-"""Draw figures in one style, for the thesis targets, the command line and notebooks."""
+"""Draw figures in a uniform style."""
 
 from ._basins import basin_picture as basin_picture
 from ._branch import branch_diagram as branch_diagram

@@ -154,7 +154,7 @@ def _colours(basins, orbits: bool):
         handles.append(Patch(color=_OTHERS, label=f"others  {rest:.1%}"))
     outside = basins.attractor[basins.attractor < 0]
     if outside.size:
-        word = "cannot start" if np.all(outside == -3) else "none"
+        word = "inadmissible" if np.all(outside == -3) else "none"
         handles.append(Patch(facecolor=NOTHING, edgecolor="0.5", label=word))
     return colours, handles
 

@@ -26,15 +26,14 @@ _MARKS = {
     "branch point": ("P", SECTION),
     "Hopf": ("H", "#56B4E9"),
     "grazing": ("^", "#8A5F00"),
-    "interruption of chattering": ("*", "#CC79A7"),
-    "beginning of impacts": ("v", "#56B4E9"),
+    "interruption of chatter": ("*", "#CC79A7"),
+    "detachment": ("v", "#56B4E9"),
 }
 _OTHER = ("X", SECTION)
 # labels next to the markers, for kinds with a long name
 _SHORT = {
     "Neimark-Sacker": "NS",
-    "interruption of chattering": "interruption",
-    "beginning of impacts": "detachment",
+    "interruption of chatter": "interruption",
 }
 # a label closer than this to another one is omitted (points)
 _ROOM = 26, 11

@@ -24,9 +24,9 @@ class Basins:
 
     `dataset` has one dimension for each component of the state, with the variables
     `attractor` (the number of the attractor to which each state leads, -1 if the motion
-    escapes to infinity, -2 if it failed, -3 if it cannot start), `impacts` and `turns`
-    (see [`jaxcam.sweeps.attractors.Labels`][]). Along the dimension `number` are the
-    `name` and `orbit` of each attractor.
+    escapes to infinity, -2 if the simulation failed, -3 if the state is inadmissible),
+    `impacts` and `turns` (see [`jaxcam.sweeps.attractors.Labels`][]). Along the
+    dimension `number` are the `name` and `orbit` of each attractor.
 
     Examples:
         >>> from jaxcam import sweeps

@@ -40,8 +40,8 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
     See Daza et al., Scientific Reports 6, 31416 (2016).
 
     Args:
-        attractor: Numbers of attractors on a grid of any dimension; states that cannot
-            start (-3) are omitted.
+        attractor: Numbers of attractors on a grid of any dimension; inadmissible states
+            (-3) are omitted.
         box: Number of cells along each side of a box.
 
     Returns:
@@ -88,8 +88,8 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
     (McDonald et al., Physica D 17, 1985).
 
     Args:
-        attractor: Numbers of attractors on a grid of any dimension; pairs with a state
-            that cannot start (-3) are omitted.
+        attractor: Numbers of attractors on a grid of any dimension; pairs with an
+            inadmissible state (-3) are omitted.
         distances: Distances in cells; the longest must fit into the grid.
 
     Returns:

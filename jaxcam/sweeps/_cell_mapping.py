@@ -29,7 +29,7 @@ def cell_mapping(
     turns: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> CellMapping:
-    """Map the centre of every cell once, and follow the cells (simple cell mapping).
+    """Map the centre of each cell, and follow cell sequences (simple cell mapping).
 
     All states outside the grid and all inadmissible states form one sink cell, which
     maps to itself. The method is an approximation, in which a cycle of small cells

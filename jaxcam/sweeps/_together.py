@@ -60,7 +60,7 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
     dims = layout.variables["turns"].dims
     names = np.array(attractor_names(*labels.T), dtype=object)
     components = component_coordinates(section.names(len(grid.shape)))
-    about = "number of the attractor; -1 escaped, -2 failed, -3 cannot start"
+    about = "number of the attractor; -1 escaped, -2 failed, -3 inadmissible"
     return xarray.Dataset(
         {
             "attractor": (dims, number.reshape(grid.shape).astype(np.int32),

@@ -1,4 +1,4 @@
-"""Analyse complete and interrupted chatter, and chatter over a period, using maps."""
+"""Analyse chatter with maps, from impact to impact and from period to period."""
 
 from ._adding import adding_thresholds as adding_thresholds
 from ._beta_map import (

@@ -166,8 +166,8 @@ class ComposedMap(eqx.Module):
 def composed_map(
     system: HybridSystem, where: Where, rank: int, phase=0.0
 ) -> ComposedMap:
-    """Compose beta with the rest of the period; all derivatives are computed
-    automatically.
+    """Compose the beta-map with the remainder of the period; all derivatives are
+    computed automatically.
 
     Args:
         system: The system at the interruption ([`variational.chatter_interruption`][]).

@@ -73,7 +73,7 @@ def find_lobes(
         phase: Phase of the section, in periods.
         component: Component of the state that deviates.
         direction: Direction along which the state deviates, shape `(2,)`; default: only
-            `component`. A map to be iterated needs `ComposedMap.vector`.
+            `component`. For a map that is to be iterated, pass `ComposedMap.vector`.
         samples: Number of points sampled in each lobe.
         most: Maximum number of lobes.
         progress: Called with the completed fraction, relative to `most` lobes.

@@ -47,9 +47,9 @@ def grazing_manifold(
 ) -> GrazingManifold:
     """Return the pre-images S^k and images W^k of the line of impacts of zero speed.
 
-    The line is restricted to times outside the sticking set Z, at which the constraint
-    would release: a motion that grazes there touches the constraint from outside
-    (thesis, eqs. 6.13-6.16).
+    The line is restricted to times outside the sticking set Z, at which contact cannot
+    last: a motion that grazes there leaves the constraint again (thesis, eqs.
+    6.13-6.16).
 
     Args:
         system: A system with two states, one constraint, a period and a positive

@@ -249,7 +249,7 @@ def _vibration(
         "resonance",
         f"a force at {frequency:.4g} Hz with a separate phase in each recording",
         "flight",
-        f"in flight, at {frequency:.4g} Hz",
+        "in flight",
         grown,
         _threshold(count, problem.samples, tests, policy, scan.cells),
         count,

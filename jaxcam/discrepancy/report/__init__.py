@@ -12,5 +12,5 @@ from ._missing import (
     MissingFunction as MissingFunction,
     slopes_of_function as slopes_of_function,
 )
-from ._words import listed as listed, number as number
+from ._words import listed as listed, number as number, spelled as spelled
 from ._write import diagnosis_of as diagnosis_of

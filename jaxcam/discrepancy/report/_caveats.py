@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..evidence import Choice, HeldOut, Outside, Rival, rms_of
 from ..search import Question, Trial, Trials
-from ._words import listed, number, quantity
+from ._words import listed, number, percent, quantity, ratio, spelled
 
 
 class Reason(enum.StrEnum):
@@ -83,7 +83,8 @@ def noisier_than_stated(question: Question) -> Iterator[Caveat]:
         yield Caveat(
             Reason.NOISIER,
             f"The measured noise of `{one.channel}` is {one.seen:.3g}, "
-            f"{one.seen / one.stated:.2g} times the stated noise ({one.stated:.3g}); "
+            f"{ratio(one.seen / one.stated)} times the stated noise "
+            f"({one.stated:.3g}); "
             "the larger value was used.",
         )
 
@@ -94,9 +95,9 @@ def above_noise(held: HeldOut, named: bool) -> Caveat:
         return poor_prediction(held)
     return Caveat(
         Reason.ABOVE_NOISE,
-        f"On held-out data the residual of the model is {held.after:.2g} times the "
-        f"sensor noise (that of the textbook model: {held.before:.2g}): the model is "
-        "incomplete, or the noise is larger than stated.",
+        f"On held-out data the residual of the model is {ratio(held.after)} times the "
+        f"sensor noise (that of the textbook model: {ratio(held.before)} times): the "
+        "model is incomplete, or the noise is larger than stated.",
     )
 
 
@@ -107,8 +108,8 @@ def poor_prediction(held: HeldOut) -> Caveat:
     return Caveat(
         Reason.POOR_PREDICTION,
         "Part of the data does not determine the parameters well enough to predict "
-        f"the rest: the residual is {held.after:.2g} times the noise, that of the "
-        f"textbook model {held.before:.2g} times. Record at more speeds.",
+        f"the rest: the residual is {ratio(held.after)} times the noise, that of the "
+        f"textbook model {ratio(held.before)} times. Record at more speeds.",
     )
 
 
@@ -117,8 +118,9 @@ def small_remainder(choice: Choice, share: float) -> Caveat:
     first = choice.unexplained[0]
     return Caveat(
         Reason.SMALL_REMAINDER,
-        f"A small discrepancy remains ({first.sentence}, {first.place}): {share:.1%} "
-        "of the explained misfit. The effect may have a slightly different form.",
+        f"A small discrepancy remains ({first.sentence}, {first.place}), "
+        f"{percent(share)} of the explained misfit: the form of the named effect may "
+        "be slightly different.",
         tuple(sorted(choice.best.names)),
     )
 
@@ -127,8 +129,8 @@ def functions_fall_short(left: float) -> Caveat:
     """Caveat: unnamed functions do not explain the recordings down to the noise."""
     return Caveat(
         Reason.FAR_FROM_DATA,
-        f"With these functions, the residual of the fit is still {left:.2g} times the "
-        "noise: they are only part of the missing physics, and their form is "
+        f"With these functions, the residual of the fit is still {ratio(left)} times "
+        "the noise: they are only part of the missing physics, and their form is "
         "approximate.",
     )
 
@@ -137,9 +139,9 @@ def functions_tie(name: str, rival: Rival) -> Caveat:
     """Caveat: another function, or another form, explains about as much."""
     return Caveat(
         Reason.TIE,
-        f"These recordings do not distinguish it from {name}, which would be chosen "
-        f"in {rival.share:.0%} of the bootstrap samples. Record motions that visit "
-        "more of the states in which the two differ.",
+        f"These recordings do not distinguish the function from {name}, which would "
+        f"be chosen in {rival.share:.0%} of the bootstrap samples. Record motions that "
+        "visit more of the states in which the two differ.",
         tuple(sorted(rival.missing.names)),
     )
 
@@ -148,16 +150,16 @@ def decoy_explains(share: float) -> Caveat:
     """Caveat: a function that acts at the wrong times explains much as well."""
     return Caveat(
         Reason.DECOY,
-        "The same function evaluated along the time-reversed motion would explain "
-        f"{share:.0%} of what it explains, so these recordings hardly show when "
-        "the force acts. Record less periodic motions.",
+        "Evaluated along the time-reversed motion, the function would explain "
+        f"{share:.0%} of what it explains along the measured motion, so these "
+        "recordings hardly show when the force acts. Record less periodic motions.",
     )
 
 
 def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.IN_DOUBT,
-        f"A term for {name.replace('_', ' ')} improves the fit, but "
+        f"A term for {spelled(name)} improves the fit, but "
         f"{_against(trials, share)}; record more data before relying on it.",
         (name,),
     )
@@ -166,7 +168,7 @@ def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
 def _beyond(outside: Outside) -> Caveat:
     """Caveat: a parameter is outside its tolerance, or a term was named instead."""
     one, name = outside.parameter, outside.term
-    label = one.name.replace("_", " ")
+    label = spelled(one.name)
     said = number(one.value, one.stderr, one.unit)
     ends = f"{one.low:.4g} to {quantity(f'{one.high:.4g}', one.unit)}"
     if not name:
@@ -179,7 +181,7 @@ def _beyond(outside: Outside) -> Caveat:
     return Caveat(
         Reason.BEYOND_TOLERANCE,
         f"The recordings determine only the sum of {label} and "
-        f"{name.replace('_', ' ')}, {said}. The tolerance allows {ends}; the excess "
+        f"{spelled(name)}, {said}. The tolerance allows {ends}; the excess "
         "is named, and its strength is only as accurate as the tolerance.",
         (name,),
     )
@@ -188,9 +190,9 @@ def _beyond(outside: Outside) -> Caveat:
 def _masked(choice: Choice, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.MASKED,
-        f"A term for {name.replace('_', ' ')} would explain {share:.1g} of the misfit "
-        f"explained by {listed(sorted(choice.best.names))}: no more than the "
-        "smoothing of dry friction at zero velocity may leave unexplained.",
+        f"A term for {spelled(name)} would explain only {share:.1g} of the misfit "
+        f"explained by {listed(sorted(choice.best.names))}; the smoothing of dry "
+        "friction at zero velocity may leave this much unexplained.",
         (name,),
     )
 
@@ -198,7 +200,7 @@ def _masked(choice: Choice, name: str, share: float) -> Caveat:
 def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.NAMED_IN_DOUBT,
-        f"The term for {name.replace('_', ' ')} is named because no discrepancy "
+        f"The term for {spelled(name)} is named because no discrepancy "
         f"remains with it, but {_against(trials, share)}; record more data to "
         "determine its strength.",
         (name,),
@@ -221,15 +223,15 @@ def _far(trials: Trials) -> Caveat:
     return Caveat(
         Reason.FAR_FROM_DATA,
         "No subset of the known effects comes close to these recordings: the residual "
-        f"of the best fit, with {named}, is {rms_of(least.fit):.2g} times the noise. "
-        "Statements about shape and location are approximate.",
+        f"of the best fit, with {named}, is {ratio(rms_of(least.fit))} times the "
+        "noise. The stated form and location of the missing physics are approximate.",
         tuple(sorted(least.names)),
     )
 
 
 def _tie(best: Trial, other: Trial) -> Caveat:
     names = tuple(sorted(other.names))
-    written = ("+".join(names) or "the textbook model").replace("_", " ")
+    written = spelled("+".join(names) or "the textbook model")
     return Caveat(
         Reason.TIE,
         f"These recordings cannot distinguish {listed(sorted(best.names))} from "

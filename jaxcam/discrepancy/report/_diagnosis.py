@@ -14,7 +14,7 @@ from ..policy import Policy
 from ..terms import FreeFunction, Value, Where, WithHidden, WithTerms
 from ._caveats import Caveat
 from ._missing import MissingFunction
-from ._words import number
+from ._words import number, spelled
 
 
 class Verdict(enum.StrEnum):
@@ -170,7 +170,7 @@ class Diagnosis:
         """The summary, and the effects with their evidence."""
         rows = [
             (
-                effect.name.replace("_", " "),
+                spelled(effect.name),
                 ", ".join(
                     f"{name} = {number(one.value, one.stderr, one.unit)}"
                     for name, one in effect.parameters.items()

@@ -51,7 +51,7 @@ _WORDS = {
     "power": "grows as the {x} to the power {power}",
     "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
     "forward": "acts only while the {x} is positive",
-    "falling": "opposes the motion near rest and fades with the {x}, over about "
+    "falling": "opposes the motion near rest and decreases with the {x}, over about "
     "{decay}",
     "curved above": "acts only above {x} {a}, and grows from there to the power "
     "{exponent}",

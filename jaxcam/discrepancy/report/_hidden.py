@@ -25,7 +25,7 @@ def hidden_table(found: Fit, hidden: Hidden, points: int):
     For a resonance, this is the magnitude of the force for a unit deflection against
     frequency (Hz). For a relaxation, it is the force against the time (s) after a unit
     deflection. For a hysteresis, it is the force against the distance from a reversal
-    at the hidden state `-limit` (full slip, unless the element stiffens).
+    at the internal state `-limit` (full slip, unless the element stiffens).
 
     **Returns:** the argument, values and errors, each `(points,)`, and the element.
     """
@@ -82,7 +82,7 @@ def hidden_unit(element: HiddenElement, unit: str) -> str:
 
 
 def hidden_formula(element: HiddenElement) -> str:
-    """Return the equations of the hidden state z, then the force."""
+    """Return the equations of the internal state z, then the force."""
     e = element
     force = f"{_n(e.by_state)}*z"  # pyright: ignore
     if isinstance(e, Resonator):
@@ -132,18 +132,18 @@ def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) 
         )
     if isinstance(element, Relaxation):
         return (
-            f"a force with memory: it resists a deflection and relaxes over {said} s, "
-            "like rubber, or a spring and a dashpot in series"
+            "a force with an internal state: it resists a deflection and relaxes over "
+            f"{said} s, like rubber, or a spring and a dashpot in series"
         )
     assert isinstance(element, Hysteresis)
     if element.loading < 0:
         return (
-            "a force with memory: its stiffness increases with the force, and more "
-            f"during unloading than during loading (hysteresis, over about "
+            "a force with an internal state: its stiffness increases with the force, "
+            "and more during unloading than during loading (hysteresis, over about "
             f"{quantity(said, unit)})"
         )
     return (
-        "a force with memory: from each reversal it is elastic over about "
+        "a force with an internal state: from each reversal it is elastic over about "
         f"{quantity(said, unit)} and then slips (hysteresis), like a bolted joint or "
         "a wire rope"
     )

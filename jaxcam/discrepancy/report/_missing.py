@@ -59,7 +59,7 @@ class MissingFunction:
       `(n,)` or `(n, m)`.
     - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
-    - `element`: for a resonance or a force with memory, the element for a simulation.
+    - `element`: for a force with an internal state, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
     """
 
@@ -77,7 +77,7 @@ class MissingFunction:
 
     @property
     def slot(self) -> str:
-        """The label of its parameters in the fit; empty for a force with memory."""
+        """The label of its parameters in the fit; empty if it has an internal state."""
         return self.numbers[0].rpartition("_")[0] if self.numbers else ""
 
     def to_json(self) -> dict[str, Any]:

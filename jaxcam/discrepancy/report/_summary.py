@@ -9,7 +9,7 @@ from ..policy import Policy
 from ..search import Trial
 from ._diagnosis import Effect, Verdict
 from ._missing import MissingFunction
-from ._words import listed, number, percent, quantity
+from ._words import listed, number, percent, quantity, ratio, spelled
 
 
 # Lower limit of standard errors that may be zero
@@ -103,14 +103,15 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
     if fitted > policy.as_noise:
         return (
             "No physics common to the recordings is missing. However, they are not "
-            f"explained down to the sensor noise: the residual is {fitted:.2g} times "
-            f"the noise and differs from recording to recording.{tail}"
+            "explained down to the sensor noise: the residual is "
+            f"{ratio(fitted)} times the noise and differs from recording to "
+            f"recording.{tail}"
         )
     if unseen > policy.as_noise:
         tail = (
             f"{tail} However, part of the data does not determine the parameters "
             "well enough to predict the rest: the residual is "
-            f"{unseen:.2g} times the noise."
+            f"{ratio(unseen)} times the noise."
         )
     return (
         "Nothing is missing: with its parameters fitted within their tolerances, the "
@@ -136,6 +137,7 @@ def _moved(best: Trial, within: Fit, rig: Sequence[str], policy: Policy) -> str:
     if moved[name] < policy.moved_errors:
         return ""
     return (
-        f" Without it, the fit would have shifted {name.replace('_', ' ')} from "
-        f"{best.fit[name].value:.5g} to {within[name].value:.5g}."
+        f" Without {'it' if len(best.names) == 1 else 'them'}, the fit would have "
+        f"shifted {spelled(name)} from {best.fit[name].value:.5g} to "
+        f"{within[name].value:.5g}."
     )

@@ -1,8 +1,18 @@
 """Format numbers for the sentences of a verdict."""
 
+_PROPER = ("coulomb", "stribeck")
+
+
+def spelled(name: str) -> str:
+    """Return the name of a term as words, with capitals in the names of people."""
+    words = str(name).replace("_", " ")
+    for one in _PROPER:
+        words = words.replace(one, one.capitalize())
+    return words
+
 
 def listed(names) -> str:
-    names = [str(name).replace("_", " ") for name in names]
+    names = [spelled(name) for name in names]
     if not names:
         return "nothing"
     if len(names) == 1:
@@ -18,6 +28,11 @@ def quantity(text: str, unit: str) -> str:
 def number(value: float, stderr: float, unit: str) -> str:
     """Return a number with its standard error and unit."""
     return quantity(f"{value:.4g} +- {stderr:.1g}", unit)
+
+
+def ratio(value: float) -> str:
+    """Return a ratio with two significant digits, and without an exponent."""
+    return f"{value:.2g}" if value < 100 else f"{value:.0f}"
 
 
 def percent(share: float) -> str:

@@ -86,7 +86,7 @@ def system_question(
     gap.
 
     **Arguments:** as for `diagnose`; the `stated` constants of the forms, by name; the
-    channel of a turning drive, which is searched for ripple.
+    channel of a rotating drive, which is searched for ripple.
 
     **Raises:** `ValueError` for recordings that are not segmented, or without sensors.
     """

@@ -23,7 +23,7 @@ def _field(default: float = 0.0):
 
 
 class HiddenElement(eqx.Module):
-    """A hidden state and the force that it exerts, per unit of mass.
+    """A internal state and the force that it exerts, per unit of mass.
 
     In addition, the force has a `constant` part, a part proportional to the deflection
     of the coordinate from `middle` (`stiffness`), and a part proportional to its
@@ -32,7 +32,7 @@ class HiddenElement(eqx.Module):
     """
 
     names: ClassVar[tuple[str, ...]]
-    """Names of the components of the hidden state."""
+    """Names of the components of the internal state."""
 
     constant: eqx.AbstractVar[FloatScalar]
     """Constant part of the acceleration."""
@@ -45,7 +45,7 @@ class HiddenElement(eqx.Module):
 
     @abc.abstractmethod
     def units(self, unit: str) -> tuple[str, ...]:
-        """Return the units of the hidden state, given that of the coordinate."""
+        """Return the units of the internal state, given that of the coordinate."""
 
     @abc.abstractmethod
     def scales(self) -> tuple[FloatScalar, ...]:
@@ -65,11 +65,11 @@ class HiddenElement(eqx.Module):
 
     @abc.abstractmethod
     def rate(self, position, velocity, hidden: Float[Array, " h"]) -> Array:
-        """Return the rate of change of the hidden state."""
+        """Return the rate of change of the internal state."""
 
     @abc.abstractmethod
     def push(self, hidden: Float[Array, " h"]) -> Array:
-        """Return the acceleration due to the hidden state alone."""
+        """Return the acceleration due to the internal state alone."""
 
     def force(self, position, velocity, hidden: Float[Array, " h"]) -> Array:
         """Return the acceleration of the coordinate."""
@@ -85,14 +85,14 @@ class Resonator(HiddenElement):
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden", "hidden_rate")
-    """Names of the components of the hidden state."""
+    """Names of the components of the internal state."""
 
     frequency: FloatScalar = _field(1.0)
     """Natural frequency (Hz)."""
     ratio: FloatScalar = _field(0.1)
     """Damping ratio D."""
     by_state: FloatScalar = _field()
-    """Acceleration per unit of the hidden state."""
+    """Acceleration per unit of the internal state."""
     by_rate: FloatScalar = _field()
     """Acceleration per unit of its rate of change."""
     constant: FloatScalar = _field()
@@ -132,12 +132,12 @@ class Relaxation(HiddenElement):
     """A spring and a dashpot in series (Maxwell): `z' = v - z / time`, force `k z`."""
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
-    """Names of the components of the hidden state."""
+    """Names of the components of the internal state."""
 
     time: FloatScalar = _field(1.0)
     """Relaxation time (s)."""
     by_state: FloatScalar = _field()
-    """Acceleration per unit of the hidden state."""
+    """Acceleration per unit of the internal state."""
     constant: FloatScalar = _field()
     """Constant part of the acceleration."""
     stiffness: FloatScalar = _field()
@@ -170,10 +170,10 @@ class Hysteresis(HiddenElement):
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
-    """Names of the components of the hidden state."""
+    """Names of the components of the internal state."""
 
     limit: FloatScalar = _field(1.0)
-    """Scale of the hidden state, in the unit of the coordinate; its largest value if
+    """Scale of the internal state, in the unit of the coordinate; its largest value if
     `loading` is 1.
     """
     beta: FloatScalar = _field(0.5)
@@ -183,7 +183,7 @@ class Hysteresis(HiddenElement):
     power: FloatScalar = _field(1.0)
     """Sharpness n of the transition."""
     by_state: FloatScalar = _field()
-    """Acceleration per unit of the hidden state."""
+    """Acceleration per unit of the internal state."""
     constant: FloatScalar = _field()
     """Constant part of the acceleration."""
     stiffness: FloatScalar = _field()

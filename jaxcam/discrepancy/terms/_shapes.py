@@ -121,7 +121,7 @@ class Harmonics(Shape):
 
 
 class ForceOfAngle(Polynomial):
-    name: ClassVar[str] = "force_of_angle"
+    name: ClassVar[str] = "force_of_position"
     sentence: ClassVar[str] = "a force that depends on the position"
     region: ClassVar[str] = "in flight, as a function of position"
     variable: ClassVar[Variable] = Variable.POSITION
@@ -154,7 +154,7 @@ class ForceOfTime(Polynomial):
 
 
 class FrictionOfAngle(Polynomial):
-    name: ClassVar[str] = "friction_of_angle"
+    name: ClassVar[str] = "friction_of_position"
     sentence: ClassVar[str] = "friction that depends on the position"
     region: ClassVar[str] = (
         "in flight, as a function of position and direction of motion"
@@ -195,14 +195,14 @@ class SurfaceOfPhase(Harmonics):
         return self.value(motion.phase)
 
 
-class BounceOfSpeed(Polynomial):
-    name: ClassVar[str] = "bounce_of_speed"
+class RestitutionOfSpeed(Polynomial):
+    name: ClassVar[str] = "restitution_of_speed"
     sentence: ClassVar[str] = (
         "a coefficient of restitution that depends on the approach speed"
     )
     where: ClassVar[str] = Where.IMPACT
     region: ClassVar[str] = "at impacts, as a function of approach speed"
-    quantity: ClassVar[str] = "bounce"
+    quantity: ClassVar[str] = "restitution"
     variable: ClassVar[Variable] = Variable.APPROACH
     count: ClassVar[int] = 4
     unit: ClassVar[str] = "-"
@@ -212,14 +212,14 @@ class BounceOfSpeed(Polynomial):
         return 1 + self.value(approach)
 
 
-class BounceOfTime(Polynomial):
-    name: ClassVar[str] = "bounce_of_time"
+class RestitutionOfTime(Polynomial):
+    name: ClassVar[str] = "restitution_of_time"
     sentence: ClassVar[str] = (
         "a coefficient of restitution that varies during a recording"
     )
     where: ClassVar[str] = Where.IMPACT
     region: ClassVar[str] = "at impacts, as a function of time"
-    quantity: ClassVar[str] = "bounce"
+    quantity: ClassVar[str] = "restitution"
     variable: ClassVar[Variable] = Variable.TIME
     count: ClassVar[int] = 3
     unit: ClassVar[str] = "-"
@@ -230,14 +230,14 @@ class BounceOfTime(Polynomial):
         return 1 + self.value(motion.t)
 
 
-class BounceOfPhase(Harmonics):
-    name: ClassVar[str] = "bounce_of_phase"
+class RestitutionOfPhase(Harmonics):
+    name: ClassVar[str] = "restitution_of_phase"
     sentence: ClassVar[str] = (
         "a coefficient of restitution that depends on the drive phase"
     )
     where: ClassVar[str] = Where.IMPACT
     region: ClassVar[str] = "at impacts, as a function of drive phase"
-    quantity: ClassVar[str] = "bounce"
+    quantity: ClassVar[str] = "restitution"
     variable: ClassVar[Variable] = Variable.PHASE
     count: ClassVar[int] = 4
     unit: ClassVar[str] = "-"
@@ -317,8 +317,8 @@ def shapes(
         ForceOfVelocity(zeros(ForceOfVelocity), *velocities),
         ForceOfTime(zeros(ForceOfTime), 0.0, duration),
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
-        BounceOfSpeed(zeros(BounceOfSpeed), *approach),
-        BounceOfTime(zeros(BounceOfTime), 0.0, duration),
+        RestitutionOfSpeed(zeros(RestitutionOfSpeed), *approach),
+        RestitutionOfTime(zeros(RestitutionOfTime), 0.0, duration),
         # a constant is an offset; a part proportional to the position is a gain error
         SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
         SensorOfTime(zeros(SensorOfTime), 0.0, duration),
@@ -327,7 +327,7 @@ def shapes(
         found += [
             ForceOfPhase(zeros(ForceOfPhase)),
             SurfaceOfPhase(zeros(SurfaceOfPhase), first=2),
-            BounceOfPhase(zeros(BounceOfPhase)),
+            RestitutionOfPhase(zeros(RestitutionOfPhase)),
             SensorOfPhase(zeros(SensorOfPhase)),
         ]
     return tuple(found)

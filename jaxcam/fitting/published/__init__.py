@@ -1,4 +1,4 @@
-"""Fit parameters to printed numbers instead of recordings."""
+"""Fit parameters to published values instead of recordings."""
 
 from ._free_fall import fit_free_fall as fit_free_fall, FreeFall as FreeFall
 from ._interruption_point import (

@@ -19,8 +19,7 @@ def interruption_of_chattering(
     *,
     periods: int = 1,
 ) -> Float[Array, ""]:
-    """Return the parameter value at which complete chatter ends at the release
-    point.
+    """Return the parameter value at which chatter accumulates at the release point.
 
     This is [`variational.chatter_interruption`][] for use in a fit: it can be
     differentiated in forward mode with respect to all other parameters, and it returns

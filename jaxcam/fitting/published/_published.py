@@ -1,6 +1,6 @@
-"""Fit parameters to printed numbers instead of recordings.
+"""Fit parameters to published values instead of recordings.
 
-The data are published numbers (multipliers, positions, speeds, bifurcation points). The
+The data are published values (multipliers, positions, speeds, bifurcation points). The
 model is a differentiable function that computes them, and nominal values with
 tolerances are the prior:
 
@@ -31,7 +31,7 @@ _XTOL = 1e-10
 
 
 class Published(eqx.Module):
-    """Printed numbers and the function that computes them from the model.
+    """Published values, and the function that computes them from the model.
 
     Raises:
         ValueError: An error is not positive.
@@ -44,7 +44,7 @@ class Published(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    """Name of the numbers for the report."""
+    """Name of the values for the report."""
     compute: Callable[[Any], Float[Array, " k"]]
     """Function of the model that returns an array `(k,)`; it must be
     differentiable, as [`variational.impact_orbit`][] and
@@ -96,7 +96,7 @@ def fit_published(
     max_steps: int = 512,
     progress: Callable[[int, float], None] | None = None,
 ) -> PublishedFit:
-    """Fit parameters of a model to published numbers.
+    """Fit parameters of a model to published values.
 
     The method is Levenberg-Marquardt, in stages of decreasing standard errors.
 

@@ -1,4 +1,4 @@
-"""The result of a fit to published numbers, and its undetermined combinations."""
+"""The result of a fit to published values, and its undetermined combinations."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -42,9 +42,9 @@ class PublishedFit:
     directions: Float[np.ndarray, "p p"]
     """The combinations, one per row, in units of the tolerances, shape `(p, p)`."""
     published: tuple[Any, ...]
-    """The published numbers."""
+    """The published values."""
     predicted: Float[np.ndarray, " n"]
-    """The computed numbers, shape `(n,)`."""
+    """The computed values, shape `(n,)`."""
     steps: int
     """Number of iterations."""
     converged: bool
@@ -136,7 +136,7 @@ class PublishedFit:
         )
 
     def numbers(self) -> "pd.DataFrame":
-        """Return published and computed numbers; the last column is in standard
+        """Return published and computed values; the last column is in standard
         errors.
         """
         import pandas as pd

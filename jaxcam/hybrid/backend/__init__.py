@@ -1,9 +1,9 @@
-"""Compile the event loop to machine code with LLVM, starting from the traced attempt.
+"""Compile the event loop to machine code with LLVM, from one traced iteration.
 
-XLA compiles an attempt as hundreds of inner loops over a batch and passes values
-between them through memory. Here, a single loop contains one attempt for as many batch
-elements as fit into a vector register, and replaces elements that end. It is used for
-runs that are not traced. The program is the same; results differ only by rounding
+XLA compiles an iteration as hundreds of inner loops over a batch and passes values
+between them through memory. Here, a single loop contains one iteration for as many
+batch elements as fit into a vector register, and replaces elements that end. It is used
+for runs that are not traced. The program is the same; results differ only by rounding
 errors.
 """
 

@@ -1,4 +1,4 @@
-"""Run many trajectories in a smaller number of batch positions."""
+"""Simulate many trajectories with a smaller number of batch elements."""
 
 from ._layout import Horizon as Horizon, Lanes as Lanes, split_lanes as split_lanes
 from ._refilled_lanes import Chunking as Chunking, run_refilled as run_refilled

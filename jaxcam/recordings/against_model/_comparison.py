@@ -201,9 +201,10 @@ def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
 _PLACES = {
     "flight": "In flight, {channel} differs from the model by {ratio} times the noise",
     "contact": "In contact, it differs from the surface by {ratio} times the noise",
-    "impact place": "Impacts occur off the surface by {ratio} times their error",
-    "impact speed": "Speeds after impacts differ from the impact law by {ratio} times "
-    "their error",
+    "impact place": "At impacts, the position differs from the surface by {ratio} "
+    "times its standard error",
+    "impact speed": "The speeds after impacts differ from the impact law by {ratio} "
+    "times their standard error",
 }
 
 

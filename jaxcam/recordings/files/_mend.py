@@ -33,7 +33,7 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
 
     - Dropped samples: up to `bridge` in a row are interpolated (and marked); at a
       longer gap the recording is split.
-    - An encoder (`..._rad`) that slips by whole turns is corrected.
+    - An encoder (`..._rad`) that slips by whole revolutions is corrected.
     - Saturated samples of a rate (`..._rad_s`) are counted; a fit treats them as
         saturated if the `Sensor` has that limit.
 

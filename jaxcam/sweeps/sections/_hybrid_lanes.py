@@ -118,8 +118,9 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
         tails: Shapes of a row of the arrays.
 
     Returns:
-        The same arrays for all motions; rows of motions that cannot start, or failed,
-            are NaN or zero, with the code `BEHIND` or the reason.
+        The same arrays for all motions; rows of motions that failed, or whose initial
+            state is inadmissible, are NaN or zero, with the code `BEHIND` or the
+            reason.
     """
     states = np.asarray(states, dtype=float)
     values = None if values is None else np.asarray(values, dtype=float)

@@ -48,8 +48,8 @@ class AbstractSection(eqx.Module):
                 row of values per motion.
 
         Returns:
-            [`jaxcam.sweeps.sections.Samples`][]. A motion that cannot start has the
-                code `BEHIND` and no points.
+            [`jaxcam.sweeps.sections.Samples`][]. A motion whose initial state is
+                inadmissible has the code `BEHIND` and no points.
         """
 
     @abc.abstractmethod

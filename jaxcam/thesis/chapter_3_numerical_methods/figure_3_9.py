@@ -62,15 +62,15 @@ def compute(system: CamFollower) -> Rows:
     times = sticking_times(system)[1]
     return [
         (
-            "beginning of impacts",
+            "detachment",
             125.0,
-            special_speed(branch, "beginning of impacts"),
+            special_speed(branch, "detachment"),
             "rpm",
         ),
         (
-            "interruption of chattering",
+            "interruption of chatter",
             INTERRUPTION,
-            special_speed(branch, "interruption of chattering"),
+            special_speed(branch, "interruption of chatter"),
             "rpm",
         ),
         ("sticking time 1e-5 rpm below it", 0.0, times[-1], "s"),
