@@ -23,6 +23,7 @@ from ._piecewise_linear import (
 )
 from ._presets import preset as preset
 from ._relay_feedback import RelayFeedback as RelayFeedback
+from ._relief_valve import ReliefValve as ReliefValve
 from ._restitution import (
     ConstantRestitution as ConstantRestitution,
     LinearInSpeed as LinearInSpeed,
@@ -31,6 +32,7 @@ from ._restitution import (
 from ._spinning_ball import SpinningBall as SpinningBall
 from ._through_joints import simulate_through_joints as simulate_through_joints
 from ._triple_integrator import TripleIntegrator as TripleIntegrator
+from ._two_sided_stop import TwoSidedStop as TwoSidedStop
 from ._units import rad_s_to_rpm as rad_s_to_rpm, rpm_to_rad_s as rpm_to_rad_s
 from ._valve_train import ValveTrain as ValveTrain
 from .cams import (
