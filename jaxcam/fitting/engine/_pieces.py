@@ -7,10 +7,16 @@ from typing import TypeAlias
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
-from scipy.signal import savgol_coeffs
 
 from ...recordings import RecordingError, Segments
 from ...recordings.cut import measured_noise
+from ._driven_steps import (
+    drive_at,
+    drive_error,
+    input_at,
+    input_in_steps,
+    mean_rates,
+)
 from ._piece_length import bearable_length
 
 
@@ -214,17 +220,19 @@ def gather(
         joint[row, : len(flights)] = [span.joint for span in flights]
         exists[row, : len(flights)] = True
         rest_exists[row, : len(contacts)] = True
-    middle = flown.start[..., None] + flown.step[..., None] * (np.arange(steps) + 0.5)
+    starts, lengths = np.asarray(flown.start), np.asarray(flown.step)
+    edges = starts[..., None] + lengths[..., None] * np.arange(steps + 1)
+    middle = (edges[..., 1:] + edges[..., :-1]) / 2
     nodes = rested.start[..., None] + rested.step[..., None] * np.arange(steps + 1)
     if measured is None:
-        angle, _ = _drive(segments, middle)
-        rate = _mean_rate(segments, flown, steps)
-        angle_at, rate_at = _drive(segments, flown.start)
-        rest_angle, rest_rate = _drive(segments, nodes)
+        angle, _ = drive_at(segments, middle)
+        rate = mean_rates(segments, edges)
+        angle_at, rate_at = drive_at(segments, flown.start)
+        rest_angle, rest_rate = drive_at(segments, nodes)
     else:
-        angle, rate = _input_in_steps(segments, measured, flown, steps)
-        angle_at = _input(segments, measured, flown.start)
-        rest_angle = _input(segments, measured, nodes)
+        angle, rate = input_in_steps(segments, measured, edges)
+        angle_at = input_at(segments, measured, flown.start)
+        rest_angle = input_at(segments, measured, nodes)
         rate_at, rest_rate = np.zeros(angle_at.shape), np.zeros(rest_angle.shape)
     pieces = Pieces(
         flown,
@@ -239,7 +247,7 @@ def gather(
         rest_angle,
         rest_rate,
         np.array([_REACH * part.recording.interval for part in segments]),
-        np.array([_drive_error(part) for part in segments]),
+        np.array([drive_error(part) for part in segments]),
     )
     return pieces, cuts
 
@@ -268,91 +276,3 @@ def _samples(part: Segments, cut: list[Span], channels, size, steps, most):
             value[k, b, : len(inside)] = columns[span.rows[inside]]
             known[k, b, : len(inside)] = np.isfinite(columns[span.rows[inside]])
     return start, step, place, np.where(known, value, 0.0), known
-
-
-def _drive(segments, times):
-    """Return the angle and rate of each recording's drive, in the shape of `times`."""
-    angle, rate = np.zeros(times.shape), np.ones(times.shape)
-    for row, part in enumerate(segments):
-        if part.drive is not None:
-            time, at = part.recording.time, times[row]
-            angle[row] = np.interp(at, time, part.drive.angle)
-            rate[row] = np.interp(at, time, part.drive.rate)
-    return angle, rate
-
-
-def _mean_rate(segments, flown: Samples, steps: int):
-    """Return the mean rate of each recording's drive in every step, `(r, k, n)`.
-
-    The noise of the mean cancels between neighbouring steps, unlike that of a sample.
-    """
-    step = np.asarray(flown.step)[..., None]
-    edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
-    mean = np.ones((*flown.start.shape, steps))
-    for row, part in enumerate(segments):
-        if part.drive is not None:
-            time = part.recording.time
-            middle = (part.drive.rate[1:] + part.drive.rate[:-1]) / 2
-            turned = np.concatenate([[0.0], np.cumsum(middle * np.diff(time))])
-            mean[row] = np.diff(np.interp(edges[row], time, turned)) / step[row]
-    return mean
-
-
-def _input(segments, channel: str, times):
-    """Return the input of each recording, held since the last sample, in the shape of
-    `times`.
-    """
-    found = np.zeros(times.shape)
-    for row, part in enumerate(segments):
-        time = part.recording.time
-        last = np.searchsorted(time, times[row], side="right") - 1
-        found[row] = part.recording[channel][np.maximum(last, 0)]
-    return found
-
-
-def _input_in_steps(segments, channel: str, flown: Samples, steps: int):
-    """Return the mean and the slope of each recording's input in every step, `(r, k,
-    n)`.
-
-    A linear input with them has the integral and the first moment of the held samples:
-    a step that contains a jump would otherwise leave an error of position.
-    """
-    step = np.asarray(flown.step)[..., None]
-    edges = np.asarray(flown.start)[..., None] + step * np.arange(steps + 1)
-    mean, slope = np.zeros((2, *flown.start.shape, steps))
-    for row, part in enumerate(segments):
-        time, level = part.recording.time, part.recording[channel]
-        first, second = _integrals(time, level, edges[row])
-        h = step[row]
-        mean[row] = np.diff(first) / h
-        # by parts: the moment about the middle of a step
-        moment = h / 2 * (first[:, 1:] + first[:, :-1]) - np.diff(second)
-        slope[row] = 12 * moment / h**3
-    return mean, slope
-
-
-def _integrals(time, level, at):
-    """Return the first and second integrals of held samples at some times."""
-    interval = np.diff(time)
-    first = np.concatenate([[0.0], np.cumsum(level[:-1] * interval)])
-    grown = first[:-1] * interval + level[:-1] * interval**2 / 2
-    second = np.concatenate([[0.0], np.cumsum(grown)])
-    last = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    after = np.clip(at - time[last], 0.0, interval[last])
-    once = first[last] + level[last] * after
-    return once, second[last] + first[last] * after + level[last] * after**2 / 2
-
-
-def _drive_error(part: Segments) -> tuple[float, float, float, float]:
-    """Return the standard errors of a drive: of its smoothed angle and rate, of the
-    integral of that rate, and of the mean angle over one second.
-    """
-    if part.drive is None:
-        return 0.0, 0.0, 0.0, 0.0
-    interval = part.recording.interval
-    count = part.drive.window
-    smooth = savgol_coeffs(count, 2)
-    slope = savgol_coeffs(count, 2, deriv=1, delta=interval)
-    weights = smooth, slope, np.cumsum(slope) * interval
-    angle, rate, turned = (part.drive.noise * float(np.linalg.norm(w)) for w in weights)
-    return angle, rate, turned, part.drive.noise * float(np.sqrt(interval))
