@@ -5,11 +5,13 @@ from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import savgol_coeffs
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from ...recordings import Segments
 
 
+# Length of the window that shows changes of the rate, over that which smooths it
+_STEADY = 10
 # Ends of the steps of each piece of each recording
 Edges: TypeAlias = Float[np.ndarray, "r k n1"]
 
@@ -85,16 +87,48 @@ def _integrals(time, level, at):
     return once, second[last] + first[last] * after + level[last] * after**2 / 2
 
 
-def drive_error(part: Segments) -> tuple[float, float, float, float]:
+def drive_error(
+    part: Segments, length: float
+) -> tuple[float, float, float, float, float]:
     """Return the standard errors of a drive: of its smoothed angle and rate, of the
-    integral of that rate, and of the mean angle over one second.
+    integral of that rate, of the mean angle over one second, and of the rate of uniform
+    rotation over a piece of some `length` (s).
+
+    A model of a system is driven at a uniform rate. The forces of an acceleration are
+    as large as those of an error `acceleration / (2 rate)` of the rate, for a base that
+    moves with the drive; they act over the time in which the rate changes, which is
+    longer than a piece.
     """
     if part.drive is None:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     interval = part.recording.interval
     count = part.drive.window
     smooth = savgol_coeffs(count, 2)
     slope = savgol_coeffs(count, 2, deriv=1, delta=interval)
     weights = smooth, slope, np.cumsum(slope) * interval
     angle, rate, turned = (part.drive.noise * float(np.linalg.norm(w)) for w in weights)
-    return angle, rate, turned, part.drive.noise * float(np.sqrt(interval))
+    mean = part.drive.noise * float(np.sqrt(interval))
+    return angle, rate, turned, mean, _unsteadiness(part, length)
+
+
+def _unsteadiness(part: Segments, length: float) -> float:
+    """Return the error of the rate (rad/s) that stands for its changes."""
+    drive, interval = part.drive, part.recording.interval
+    assert drive is not None
+    count = min(_STEADY * drive.window, len(drive.rate) // 3) // 2 * 2 - 1
+    if count < 5:
+        return 0.0
+    inside = slice(count // 2, -(count // 2))
+    slow = np.asarray(savgol_filter(drive.rate, count, 2))[inside]
+    change = np.asarray(savgol_filter(drive.rate, count, 2, deriv=1, delta=interval))
+    first = savgol_coeffs(drive.window, 2, deriv=1, delta=interval)
+    second = savgol_coeffs(count, 2, deriv=1, delta=interval)
+    noise = drive.noise * float(np.linalg.norm(np.convolve(first, second)))
+    # a few independent values scatter by about as much as their mean
+    square = float(np.mean(change[inside] ** 2)) - 2 * noise**2
+    if square <= 0:
+        return 0.0
+    acceleration = np.sqrt(square)
+    lasts = np.std(slow) / acceleration
+    shares = np.sqrt(max(1.0, lasts / length))
+    return float(acceleration / (2 * abs(drive.speed)) * shares)

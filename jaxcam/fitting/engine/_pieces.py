@@ -64,8 +64,7 @@ class Pieces(eqx.Module):
         `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
-    - `drive_error`: standard errors of the drive's angle, of its rate, of the integral
-        of its rate, and of the mean angle over one second, for each recording.
+    - `drive_error`: standard errors of each recording's drive, as in `drive_error`.
     - `substeps`: number of parts into which a prediction divides each step.
     """
 
@@ -81,7 +80,7 @@ class Pieces(eqx.Module):
     rest_angle: Float[Numbers, "r kc n1"]
     rest_rate: Float[Numbers, "r kc n1"]
     reach: Float[Numbers, " r"]
-    drive_error: Float[Numbers, "r 4"]
+    drive_error: Float[Numbers, "r 5"]
     substeps: int = eqx.field(static=True, default=1)
 
 
@@ -247,7 +246,9 @@ def gather(
         rest_angle,
         rest_rate,
         np.array([_REACH * part.recording.interval for part in segments]),
-        np.array([drive_error(part) for part in segments]),
+        np.array(
+            [drive_error(part, _PIECE * part.recording.interval) for part in segments]
+        ),
     )
     return pieces, cuts
 

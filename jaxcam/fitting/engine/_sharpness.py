@@ -146,7 +146,7 @@ def _variances(ss, before):
 @program
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     """Return the error of each piece's initial state, `(r, k, n)`, due to the noise of
-    the drive during the previous piece.
+    the drive during the previous piece, and to its changes of rate.
 
     The noise of the samples is independent, that of the smoothed angle and rate is not.
     Integration by parts turns the effect of the rate into one of the angle; what
@@ -163,7 +163,9 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
             slopes = jax.jacfwd(end)(jnp.zeros((2, *angle.shape)))
             weights = slopes[:, 0] - jnp.gradient(slopes[:, 1], axis=-1) / step
-            return error[3] * jnp.sqrt(jnp.sum(weights**2, axis=-1) / step)
+            noise = error[3] ** 2 * jnp.sum(weights**2, axis=-1) / step
+            unsteady = error[4] * jnp.sum(slopes[:, 1], axis=-1)
+            return jnp.sqrt(noise + unsteady**2)
 
         found = jax.vmap(spread)(states, start, step, angles, rates)
         return jnp.concatenate([found[:1], found[:-1]])

@@ -231,7 +231,7 @@ class _Engine:
         if self.crowded == _MANY:
             self.code = TOGETHER
         rebound = Rebound(t, after, k, self.contact, speeds, self.fastest)
-        depth = self.settings.chatter_depth
+        depth = float(self.settings.chatter_depth)
         rest = end_of_chatter(self.motion, rebound, depth, tiny, self.longest)
         if rest is not None and rest.time <= self.end:
             self._close(k, before, rest)
