@@ -57,12 +57,10 @@ def with_missed_impacts(
     segments = tuple(segments)
     accepted: list[Spans] = [() for _ in segments]
     refused: list[Spans] = [() for _ in segments]
-    try:
-        before = _misfits(model, parameters, segments)
-    except ValueError:
-        # whoever fits these recordings is told why this is not possible
-        return segments
+    before = _misfits(model, parameters, segments)
     for _ in range(_ROUNDS):
+        if before is None:
+            break
         fresh = [
             tuple(span for span in spans if span not in old)
             for spans, old in zip(_doubted(before), refused)
@@ -71,6 +69,8 @@ def with_missed_impacts(
             break
         found = again([a + b for a, b in zip(accepted, fresh)])
         after = _misfits(model, parameters, found)
+        if after is None:
+            break
         good = [
             tuple(span for span in spans if _explained(span, old, new, part))
             for spans, old, new, part in zip(fresh, before, after, found)
@@ -86,11 +86,15 @@ def with_missed_impacts(
     return segments
 
 
-def _misfits(model, parameters, segments) -> list[_Misfits]:
+def _misfits(model, parameters, segments) -> list[_Misfits] | None:
     """Fit each piece by itself, with the parameters that suit all of them, and return
-    the misfits of each recording.
+    the misfits of each recording, or None if the recordings cannot be fitted.
     """
-    problem = Problem.build(model, segments, parameters)
+    try:
+        problem = Problem.build(model, segments, parameters)
+    except ValueError:
+        # whoever fits these recordings is told why
+        return None
     problem = dataclasses.replace(problem, extras=separated(problem.extras))
     pieces = problem.pieces
     fitted = fit(problem, iterations=_STEPS, stop=lambda costs: False)

@@ -20,10 +20,10 @@ class ReliefValve(HybridSystem):
     The state is (lift, lift rate, pressure): `x'' + damping x' + x + preload =
     pressure`, and `pressure' = compressibility (flow - x sqrt(pressure))`. The seat is
     at lift zero. When the flow falls below a Hopf point, the valve begins to oscillate;
-    when the amplitude reaches the seat, it chatters.
+    when the amplitude reaches the seat, it impacts.
 
     G. Licsko, A. Champneys and C. Hos, Nonlinear analysis of a single stage pressure
-    relief valve, IAENG International Journal of Applied Mathematics 39 (2009), 286-299.
+    relief valve, IAENG International Journal of Applied Mathematics 39 (2009).
 
     Examples:
         >>> from jaxcam.models import ReliefValve
@@ -73,11 +73,6 @@ class ReliefValve(HybridSystem):
         """
         del t
         return jnp.stack([state[0], -self.restitution * state[1], state[2]])
-
-    @property
-    def period(self) -> None:
-        """The valve is autonomous."""
-        return None
 
     def check(self) -> None:
         """Raise `ValueError` if a parameter has no physical meaning."""

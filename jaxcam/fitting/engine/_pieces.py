@@ -64,7 +64,8 @@ class Pieces(eqx.Module):
         `rate` is zero.
     - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
-    - `drive_error`: standard errors of each recording's drive, as in `drive_error`.
+    - `drive_error`: standard errors of each recording's drive, see
+        `_driven_steps.py`.
     - `substeps`: number of parts into which a prediction divides each step.
     """
 

@@ -155,6 +155,7 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
     def one(values, error, states, start, step, angles, rates):
         model = layout.at(values)
+        mean, unsteady = error[3:]
 
         def spread(state, start, step, angle, rate):
             def end(shifts):
@@ -163,9 +164,8 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
             slopes = jax.jacfwd(end)(jnp.zeros((2, *angle.shape)))
             weights = slopes[:, 0] - jnp.gradient(slopes[:, 1], axis=-1) / step
-            noise = error[3] ** 2 * jnp.sum(weights**2, axis=-1) / step
-            unsteady = error[4] * jnp.sum(slopes[:, 1], axis=-1)
-            return jnp.sqrt(noise + unsteady**2)
+            noise = mean**2 * jnp.sum(weights**2, axis=-1) / step
+            return jnp.sqrt(noise + (unsteady * jnp.sum(slopes[:, 1], axis=-1)) ** 2)
 
         found = jax.vmap(spread)(states, start, step, angles, rates)
         return jnp.concatenate([found[:1], found[:-1]])

@@ -106,24 +106,9 @@ def land(
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(t, landed, after, approach, rebound, flown.constraint)
-    pulled = jnp.abs(of_constraint([j.acceleration for j in jets], flown.constraint))
-    ending = _ending(
-        functions,
-        plan,
-        carried,
-        end,
-        impact,
-        speeds,
-        jets,
-        mode,
-        hit,
-        fastest,
-        pulled,
-        rounding,
-    )
-    hidden = _hides(
-        carried, t, impact, pulled, of_constraint(rounding, flown.constraint)
-    )
+    parts = carried, end, impact, speeds, jets, mode, hit, fastest, rounding
+    ending = _ending(functions, plan, *parts)
+    hidden = _hides(carried, impact, jets, rounding)
     return Landing(
         t,
         seen,
@@ -156,23 +141,9 @@ class _Ending(NamedTuple):
 
 
 def _ending(
-    functions,
-    plan,
-    carried,
-    end,
-    impact,
-    speeds,
-    jets,
-    mode,
-    hit,
-    fastest,
-    pulled,
-    rounding,
+    functions, plan, carried, end, impact, speeds, jets, mode, hit, fastest, rounding
 ) -> _Ending:
-    """Complete the impacts after one, on its constraint or on several.
-
-    **Arguments:** `pulled` is the size of the acceleration of the gap hit.
-    """
+    """Complete the impacts after one, on its constraint or on several."""
     if not functions.m:
         return _Ending(no_rest(impact), jnp.asarray(False), [], [])
     chatter = rest_of_chatter(
@@ -182,7 +153,7 @@ def _ending(
     # height is v^2 / 2a, and below 250 times the rounding, it is hidden
     deep = impact.rebound <= plan.depth * fastest
     low = 500 * of_constraint(carried.blur, impact.constraint)
-    hides = impact.rebound * impact.rebound <= low * pulled
+    hides = impact.rebound * impact.rebound <= low * _pull(jets, impact)
     begins = chatter.possible & (deep | hides)
     closing = [begins & h for h in hit[: functions.m]]
     pulls = [chatter.acceleration] * functions.m
@@ -219,15 +190,22 @@ def _kept_contacts(functions, carried, lands, t, before, after):
     )
 
 
-def _hides(carried, t, impact, pulled, rounding):
+def _pull(jets, impact):
+    """Return the size of the acceleration of the gap that was hit."""
+    return jnp.abs(of_constraint([j.acceleration for j in jets], impact.constraint))
+
+
+def _hides(carried, impact, jets, roundings):
     """Return whether the flight after or before an impact is lost in rounding.
 
     The height of the flight after it is v^2 / 2a; without an acceleration towards the
     constraint, the height of the flight before it was at most its final speed times its
     duration.
     """
+    rounding = of_constraint(roundings, impact.constraint)
+    pulled = _pull(jets, impact)
     after = impact.rebound * impact.rebound <= 500 * rounding * pulled
     if not carried.struck:
         return after
-    since = t - of_constraint(carried.struck, impact.constraint)
+    since = impact.t - of_constraint(carried.struck, impact.constraint)
     return after | (-impact.approach * since <= 500 * rounding)

@@ -12,7 +12,7 @@ from ._switches import OnSides, surfaces
 
 def has_friction(system: HybridSystem) -> bool:
     """Return whether the contacts of a system have friction."""
-    switched = system.system if isinstance(system, OnSides) else system
+    switched = _whole(system)
     if not isinstance(switched, SwitchedSystem):
         return False
     return type(switched).contact_friction is not SwitchedSystem.contact_friction
@@ -28,7 +28,7 @@ def sides_of(system: HybridSystem, t, x) -> Float[Array, " k"]:
 
 def surfaces_of(system: HybridSystem, t, x) -> Float[Array, " k"]:
     """Return the switching functions of a switched system or of one of its branches."""
-    return surfaces(system.system if isinstance(system, OnSides) else system, t, x)
+    return surfaces(_whole(system), t, x)
 
 
 def friction_of(system: HybridSystem, t, x) -> Float[Array, "m n"]:
@@ -42,11 +42,14 @@ def friction_on(
     system: HybridSystem, t, x, sides: Float[Array, " k"]
 ) -> Float[Array, "m n"]:
     """Return the friction of each contact on the given sides."""
-    switched: Any = system.system if isinstance(system, OnSides) else system
-    return jnp.atleast_2d(switched.contact_friction(t, x, sides))
+    return jnp.atleast_2d(_whole(system).contact_friction(t, x, sides))
 
 
 def restitution_kind(system: HybridSystem) -> str:
     """Return the hypothesis of restitution of a system with friction."""
-    switched: Any = system.system if isinstance(system, OnSides) else system
-    return switched.restitution_kind
+    return _whole(system).restitution_kind
+
+
+def _whole(system: HybridSystem) -> Any:
+    """Return the system of which this may be one branch."""
+    return system.system if isinstance(system, OnSides) else system

@@ -43,7 +43,7 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
     - `restitution`: the coefficient of restitution.
     - `kind`: `"kinematic"` (Newton), `"kinetic"` (Poisson) or `"energetic"` (Stronge).
 
-    **References:** W. J. Stronge, Impact Mechanics (2000), sections 3.1 to 3.4; J. B.
+    **References:** W. J. Stronge, Impact Mechanics (2000); J. B.
     Keller, Impact with friction, Journal of Applied Mechanics 53 (1986), 1-4.
     """
     before = _of_side(side > 0, rates)
