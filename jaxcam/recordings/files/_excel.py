@@ -24,7 +24,7 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
     raw = read_bytes(file)
     try:
         # pandas needs it for workbooks and reports its absence only on reading
-        import openpyxl  # noqa: F401  # pyright: ignore
+        import openpyxl  # noqa: F401 (only its absence matters)  # pyright: ignore
         import pandas as pd
     except ImportError:
         raise RecordingError(
