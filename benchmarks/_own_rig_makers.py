@@ -25,8 +25,8 @@ _CHATTER = 2e-3
 class Maker(NamedTuple):
     """The motion of a rig.
 
-    - `field(p, x, phi, w, u)`: rate of change of the state, given the drive's angle and
-        rate or an input.
+    - `field(p, x, drive, u)`: rate of change of the state, given the angle, rate and
+        acceleration of the drive, or an input.
     - `gaps(p, x)`, and `impacts`, one impact law `(p, x)` for each gap.
     - `start`: initial state; `speeds` (rad/s): smallest and largest, for a driven rig.
     - `channels`: name of each channel, and the state component that it measures.
@@ -46,26 +46,29 @@ class Accumulates(Exception):
     """Impacts accumulate, which the tests of these rigs exclude."""
 
 
-def _two_stops(p, x, phi, w, u):
-    base = -p["base_amplitude"] * w * w * math.sin(phi)
+def _two_stops(p, x, drive, u):
+    phi, w, a = drive
+    base = p["base_amplitude"] * (a * math.cos(phi) - w * w * math.sin(phi))
     pull = p["stiffness_over_mass"] * x[0] + p["damping_over_mass"] * x[1]
     return x[1], -pull - base
 
 
-def _pendulum(p, x, phi, w, u):
-    base = -p["base_amplitude_over_length"] * w * w * math.sin(phi)
+def _pendulum(p, x, drive, u):
+    phi, w, a = drive
+    base = a * math.cos(phi) - w * w * math.sin(phi)
+    base *= p["base_amplitude_over_length"]
     weight = p["gravity_over_length"] * math.sin(x[0])
     return x[1], -weight - p["damping"] * x[1] - base * math.cos(x[0])
 
 
-def _two_masses(p, x, phi, w, u):
-    shaken = p["shaker_amplitude"] * math.sin(phi)
+def _two_masses(p, x, drive, u):
+    shaken = p["shaker_amplitude"] * math.sin(drive[0])
     a1 = -p["k1_over_m1"] * (x[0] - p["rest1"]) - p["c1_over_m1"] * x[1]
     a2 = -p["k2_over_m2"] * (x[2] - p["rest2"] - shaken) - p["c2_over_m2"] * x[3]
     return x[1], a1, x[3], a2
 
 
-def _stage(p, x, phi, w, u):
+def _stage(p, x, drive, u):
     return x[1], p["gain"] * u - p["damping"] * x[1]
 
 
@@ -179,13 +182,14 @@ def _driven(maker, setup, truth, rng, duration, speed, hidden):
     shift = rng.uniform(0, 2 * math.pi, 3)
 
     def drive(t):
-        """Angle and rate of a drive whose speed wanders by 0.02 %."""
-        angle, rate = speed * t + shift[0], speed
+        """Angle, rate and acceleration of a drive whose speed wanders by 0.02 %."""
+        angle, rate, acceleration = speed * t + shift[0], speed, 0.0
         for share, hertz, lead in ((0.7, 0.29, shift[1]), (0.3, 0.83, shift[2])):
             v = 2 * math.pi * hertz
             angle += speed * 2e-4 * share * math.sin(v * t + lead) / v
             rate += speed * 2e-4 * share * math.cos(v * t + lead)
-        return angle, rate
+            acceleration -= speed * 2e-4 * share * math.sin(v * t + lead) * v
+        return angle, rate, acceleration
 
     time = INTERVAL * np.arange(round(duration / INTERVAL))
     flight = _Flight(maker, truth, drive, hidden, SETTLE)
@@ -207,7 +211,7 @@ def _with_input(maker, setup, truth, rng, duration, hidden):
             2 * math.pi * hertz * time + rng.uniform(0, 2 * math.pi)
         )
     voltage = np.round(np.clip(voltage, -1.5, 1.5), 3)
-    flight = _Flight(maker, truth, lambda t: (0.0, 1.0), hidden, 0.0)
+    flight = _Flight(maker, truth, lambda t: (0.0, 1.0, 0.0), hidden, 0.0)
     states = flight.held(np.array(maker.start), voltage)
     channels = {setup.model.drive.channel: voltage}
     none = np.zeros(len(time))
@@ -244,14 +248,14 @@ class _Flight:
         return self.hidden is not None and self.hidden.effect.kind == kind
 
     def field(self, t, x, u=0.0):
-        angle, rate = self.drive(t)
-        found = list(self.maker.field(self.truth, x[: self.own], angle, rate, u))
+        drive = self.drive(t)
+        found = list(self.maker.field(self.truth, x[: self.own], drive, u))
         if self.hidden is None:
             return found
         own = x[self.own :]
         if self.acts("force") or self.acts("resonance"):
             more = own[0] if len(own) else 0.0
-            found[1] += self.hidden.at(x[0], x[1], angle, t - self.begin, more)
+            found[1] += self.hidden.at(x[0], x[1], drive[0], t - self.begin, more)
         return [*found, *self.hidden.rates(own, x[0], x[1])]
 
     def surface(self, t):

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from jaxcam.fitting import Model, Parameter, Problem, segment_by_model, Sensor, Turning
+from jaxcam.fitting.engine import DriveState
 from jaxcam.fitting.engine._predict import fly
 from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import Recording
@@ -75,16 +76,15 @@ def test_the_error_of_a_flight_agrees_with_repeated_noise():
     starts, steps = (
         np.asarray(x)[:count] for x in (pieces.flown.start, pieces.flown.step)
     )
-    middle = starts[:, None] + steps[:, None] * (np.arange(pieces.angle.shape[1]) + 0.5)
+    middle = starts[:, None] + steps[:, None] * (np.arange(pieces.steps) + 0.5)
 
     @eqx.filter_jit
     def ends(angles, rates):
         def one(angles, rates):
             state = jnp.zeros(2)
             for k in range(count):
-                state, _ = fly(
-                    problem.model, state, starts[k], steps[k], angles[k], rates[k]
-                )
+                drive = DriveState(angles[k], rates[k], jnp.zeros_like(rates[k]))
+                state, _ = fly(problem.model, state, starts[k], steps[k], drive)
             return state[1]
 
         return jax.vmap(one)(angles, rates)
@@ -96,7 +96,7 @@ def test_the_error_of_a_flight_agrees_with_repeated_noise():
     def at(values, where):
         return np.array([np.interp(where, time, row) for row in values])
 
-    edges = starts[:, None] + steps[:, None] * np.arange(pieces.angle.shape[1] + 1)
+    edges = starts[:, None] + steps[:, None] * np.arange(pieces.steps + 1)
     turned = np.cumsum(change, axis=1) * INTERVAL
     mean = np.diff(at(turned, edges), axis=-1) / steps[:, None]
     clean = jnp.asarray(np.broadcast_to(SPEED * middle, (200, *middle.shape)))

@@ -1,5 +1,6 @@
 """An input that is held between samples, in steps that do not end at samples."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -72,7 +73,7 @@ def test_the_end_of_every_piece_is_exact(pushed):
         s, level = t - time[k], (v[k + 1] - v[k]) / _INTERVAL
         return np.array([x[k] + v[k] * s + level * s * s / 2, v[k] + level * s])
 
-    count = pieces.angle.shape[-1]
+    count = pieces.steps
     for k in exists:
         start, h = float(part.start[0, k]), float(part.step[0, k])
         end, _ = fly(
@@ -80,8 +81,7 @@ def test_the_end_of_every_piece_is_exact(pushed):
             jnp.asarray(at(start)),
             start,
             h,
-            jnp.asarray(pieces.angle[0, k]),
-            jnp.asarray(pieces.rate[0, k]),
+            jax.tree.map(lambda part: jnp.asarray(part[0, k]), pieces.drive),
         )
         np.testing.assert_allclose(end, at(start + count * h), rtol=0, atol=1e-12)
 

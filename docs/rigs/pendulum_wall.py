@@ -18,6 +18,7 @@ class PendulumWall(HybridSystem):
     restitution: float = 0.7
     speed: float = 10.0  # speed of the drive, rad/s
     phase: float = 0.0  # phase of the drive at time zero, rad
+    acceleration: float = 0.0  # of the drive, rad/s^2
 
     @property
     def period(self):
@@ -26,7 +27,9 @@ class PendulumWall(HybridSystem):
     def vector_field(self, t, state):
         angle, v = state
         turned = self.speed * t + self.phase
-        base = -self.base_amplitude_over_length * self.speed**2 * jnp.sin(turned)
+        base = self.base_amplitude_over_length * (
+            self.acceleration * jnp.cos(turned) - self.speed**2 * jnp.sin(turned)
+        )
         weight = self.gravity_over_length * jnp.sin(angle)
         return jnp.stack([v, -weight - self.damping * v - base * jnp.cos(angle)])
 

@@ -20,6 +20,7 @@ class TwoStops(HybridSystem):
     restitution_right: float = 0.6
     speed: float = 10.0  # speed of the drive, rad/s
     phase: float = 0.0  # phase of the drive at time zero, rad
+    acceleration: float = 0.0  # of the drive, rad/s^2
 
     @property
     def period(self):
@@ -28,7 +29,9 @@ class TwoStops(HybridSystem):
     def vector_field(self, t, state):
         x, v = state
         turned = self.speed * t + self.phase
-        base = -self.base_amplitude * self.speed**2 * jnp.sin(turned)
+        base = self.base_amplitude * (
+            self.acceleration * jnp.cos(turned) - self.speed**2 * jnp.sin(turned)
+        )
         pull = self.stiffness_over_mass * x + self.damping_over_mass * v
         return jnp.stack([v, -pull - base])
 

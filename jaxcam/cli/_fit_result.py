@@ -80,7 +80,7 @@ class Result:
         if drive is not None:
             # the complete model: the drive runs at constant speed, and its angle is
             # zero at time zero
-            system = model.driven(0.0, 0.0 * drive.phase, drive.speed)
+            system = model.uniform(0.0, drive.speed)
         return as_saved(system, fit)
 
 

@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 from ..recordings import Recording, RecordingError, Segments
 from .engine import (
     augmented_field,
+    DriveState,
     filtered_channels,
     Input,
     Model,
@@ -219,7 +220,8 @@ def simulated(model: Model, one: Prepared) -> Simulated:
     def sample(x, inputs):
         number, level = inputs
         t = one.start + number * one.interval
-        system = model.driven(t, level, jnp.zeros_like(t))
+        none = jnp.zeros_like(t)
+        system = model.driven(t, DriveState(level, none, none))
 
         def advance(x, k):
             at = t + k * step

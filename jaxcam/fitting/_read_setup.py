@@ -265,9 +265,14 @@ def _drive(
             section.word(key) if key in section.table else key
             for key in ("speed", "phase")
         )
-        known_keys(file, "drive", section.table, ("channel", "speed", "phase"))
-        measured = {phase: 0.0, speed: 1.0}
-        return Turning(Field(speed), Field(phase)), channel, measured
+        measured, acceleration = {phase: 0.0, speed: 1.0}, None
+        if "acceleration" in section.table:
+            name = section.word("acceleration")
+            measured[name], acceleration = 0.0, Field(name)
+        known = ("channel", "speed", "phase", "acceleration")
+        known_keys(file, "drive", section.table, known)
+        drive = Turning(Field(speed), Field(phase), acceleration)
+        return drive, channel, measured
     if "input" in tables:
         section = Section(file, "input", tables)
         channel = _channel(section, section.word("channel"))

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from ..hybrid import HybridSystem
 from ..models import ConstantRestitution, LinearInSpeed, PowerLawRestitution
 from ..recordings import RecordingError, Segments
-from .engine import Turning
+from .engine import Model, Turning
 
 
 # Residuals beyond this many standard errors count linearly, not quadratically (Huber)
@@ -281,7 +281,7 @@ def first_bounce(
         angle = float(np.interp(at, time, segments.drive.angle))
         rate = float(np.interp(at, time, segments.drive.rate))
         speed = _speed_for_height(
-            drive.at(system, 0.0, jnp.asarray(angle), jnp.asarray(rate)),
+            Model(system, {}, drive).uniform(angle, rate),
             float(impacts.angle[k]),
             float(after.duration),
             float(after.height),

@@ -14,7 +14,14 @@ from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
 from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
 from ._missed_impacts import Spans, with_missed_impacts
-from .engine import Layout, Model, Parameter, parameter_places, with_constants
+from .engine import (
+    DriveState,
+    Layout,
+    Model,
+    Parameter,
+    parameter_places,
+    with_constants,
+)
 
 
 # Samples at which the dependence of a gap on the state is evaluated
@@ -154,12 +161,12 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
     values = np.array([float(p.where(model)) for p in parameters])
     tolerances = np.array([p.tolerance for p in parameters])
     count = len(recording)
-    angle, rate = (
-        (np.zeros(count), np.ones(count))
+    moving = (
+        (np.zeros(count), np.ones(count), np.zeros(count))
         if drive is None
-        else (drive.angle, drive.rate)
+        else (drive.angle, drive.rate, drive.acceleration.values)
     )
-    columns = [padded(part) for part in (recording.time, states, angle, rate)]
+    columns = [padded(part) for part in (recording.time, states, *moving)]
     gaps = np.asarray(_gap(layout, values, *columns))[:count].T
     rows = np.linspace(0, count - 1, _LOOKS).astype(int)
     looks = [part[rows] for part in columns]
@@ -172,29 +179,29 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
 
 
 @eqx.filter_jit
-def _gap(layout: Layout, values, times, states, angles, rates):
+def _gap(layout: Layout, values, times, states, *drive):
     return jax.vmap(lambda *at: _gaps_at(layout, values, *at))(
-        *(jnp.asarray(x) for x in (times, states, angles, rates))
+        *(jnp.asarray(x) for x in (times, states, *drive))
     )
 
 
 @eqx.filter_jit
-def _slopes(layout: Layout, values, times, states, angles, rates):
+def _slopes(layout: Layout, values, times, states, *drive):
     """Return the derivatives of the gaps with respect to the state and the parameters,
     sample by sample.
     """
 
-    def one(time, state, angle, rate):
-        by_state = jax.jacfwd(lambda x: _gaps_at(layout, values, time, x, angle, rate))
-        by_value = jax.jacfwd(lambda v: _gaps_at(layout, v, time, state, angle, rate))
+    def one(time, state, *drive):
+        by_state = jax.jacfwd(lambda x: _gaps_at(layout, values, time, x, *drive))
+        by_value = jax.jacfwd(lambda v: _gaps_at(layout, v, time, state, *drive))
         return by_state(state), by_value(values)
 
     values = jnp.asarray(values)
-    return jax.vmap(one)(*(jnp.asarray(x) for x in (times, states, angles, rates)))
+    return jax.vmap(one)(*(jnp.asarray(x) for x in (times, states, *drive)))
 
 
-def _gaps_at(layout: Layout, values, time, state, angle, rate):
-    system = layout.at(jnp.asarray(values)).driven(time, angle, rate)
+def _gaps_at(layout: Layout, values, time, state, *drive):
+    system = layout.at(jnp.asarray(values)).driven(time, DriveState(*drive))
     return jnp.atleast_1d(system.gap(time, state))
 
 

@@ -1,5 +1,5 @@
-"""Estimate the motion of a drive from its encoder: angle, rate, mean speed and
-clock.
+"""Estimate the motion of a drive from its encoder: angle, rate, acceleration,
+mean speed and clock.
 """
 
 import dataclasses
@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.signal import savgol_filter
 
+from ._drive_acceleration import drive_acceleration, DriveAcceleration
 from ._errors import RecordingError
 from ._recording import Recording
 
@@ -33,6 +34,8 @@ class Drive:
     """Standard deviation of the raw samples about the smoothed angle (rad)."""
     window: int
     """Number of samples in each smoothing parabola."""
+    acceleration: DriveAcceleration
+    """Slower changes of the rate."""
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:
@@ -73,4 +76,5 @@ def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
             "a turn."
         )
     noise = float(np.std(raw - angle))
-    return Drive(angle, rate, float(speed), float(phase), noise, count)
+    slow = drive_acceleration(raw, count, interval, noise)
+    return Drive(angle, rate, float(speed), float(phase), noise, count, slow)

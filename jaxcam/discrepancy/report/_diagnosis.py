@@ -4,8 +4,6 @@ import dataclasses
 import enum
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
-
 from ...fitting import Fit, Model, Residuals
 from ...hybrid import HybridSystem
 from ...tables import ShortTable
@@ -220,8 +218,7 @@ class Diagnosis:
         row = record if isinstance(record, int) else self.records.index(record)
         drive = self.after.problem.segments[row].drive
         if drive is not None:
-            angle, rate = (jnp.asarray(x) for x in (0.0, drive.speed))
-            system = model.driven(0.0, angle, rate)
+            system = model.uniform(0.0, drive.speed)
         base, pairs = system.base, system.coordinates  # pyright: ignore
         whole = WithTerms(base, tuple(terms), pairs) if terms else base
         for one in self.missing:

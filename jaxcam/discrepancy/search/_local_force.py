@@ -87,7 +87,7 @@ def stride_of(problem: Problem) -> int:
     Steps may be shorter than the time scale of a force requires, because of a measured
     input or of errors that accumulate over a flight of many pieces.
     """
-    halves = 2 * problem.pieces.angle.shape[-1]
+    halves = 2 * problem.pieces.steps
     stride = max(1, halves // _NODES)
     return stride if halves % stride == 0 else 1
 
@@ -100,7 +100,7 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     """
     columns = free_columns(problem, free)
     stride = stride_of(problem)
-    nodes = 2 * problem.pieces.angle.shape[-1] // stride + 1
+    nodes = 2 * problem.pieces.steps // stride + 1
     found = _linear(
         [problem.layout.about(values) for values in jnp.asarray(point.values)],
         problem.pieces,
@@ -258,13 +258,13 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
     piece.
     """
 
-    def piece(model, state, start, step, angle, rate):
+    def piece(model, state, start, step, drive):
         size = state.shape[0] - len(filtered_channels(model))
 
         def advance(x, inputs):
-            number, a, w = inputs
+            number, here = inputs
             t = start + (number + jnp.array([0.0, 0.5, 1.0])) * step
-            during = model.during(t[1], a, w)
+            during = model.during(t[1], here)
             middle, _ = runge_kutta(model, during, t[0], x, step / 2)
             end, _ = runge_kutta(model, during, t[1], middle, step / 2)
             states = jnp.stack([x, middle, end])[:, :size]
@@ -274,15 +274,15 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
 
             return end, jax.vmap(slopes)(t, states)
 
-        numbers = jnp.arange(angle.shape[0], dtype=float)
-        _, slopes = jax.lax.scan(advance, state, (numbers, angle, rate))
+        numbers = jnp.arange(drive.angle.shape[0], dtype=float)
+        _, slopes = jax.lax.scan(advance, state, (numbers, drive))
         inner = slopes[:, :2].reshape(-1, slopes.shape[-1])
         return jnp.concatenate([inner, slopes[-1, 2:]])
 
     def record(pieces, values, states):
         model = layout.at(values)
         part = pieces.flown
-        inputs = states, part.start, part.step, pieces.angle, pieces.rate
+        inputs = states, part.start, part.step, pieces.drive
         return jax.vmap(lambda *one: piece(model, *one))(*inputs)
 
     return jax.vmap(record)(pieces, *point)

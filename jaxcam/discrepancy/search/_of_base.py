@@ -30,7 +30,8 @@ def of_base(drive: Turning | Input | None) -> Turning | Input | None:
     if isinstance(drive, Input):
         return Input(drive.channel, OfBase(drive.value))
     if drive is not None:
-        return Turning(OfBase(drive.speed), OfBase(drive.phase))
+        acceleration = drive.acceleration and OfBase(drive.acceleration)
+        return Turning(OfBase(drive.speed), OfBase(drive.phase), acceleration)
     return None
 
 

@@ -34,6 +34,7 @@ from ._linearise import (
 from ._model import (
     augmented_field as augmented_field,
     cam_follower_drive as cam_follower_drive,
+    DriveState as DriveState,
     filtered_channels as filtered_channels,
     Input as Input,
     Model as Model,

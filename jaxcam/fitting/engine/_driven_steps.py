@@ -1,30 +1,32 @@
 """The measured drive or input of recordings, at given times and in steps."""
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.signal import savgol_coeffs
 
 from ...recordings import Segments
+from ...recordings.cut import Drive
+from ._model import DriveState, Numbers
 
 
-# Length of the window that shows changes of the rate, over that which smooths it
-_STEADY = 10
 # Ends of the steps of each piece of each recording
 Edges: TypeAlias = Float[np.ndarray, "r k n1"]
 
 
-def drive_at(segments: Sequence[Segments], times):
-    """Return the angle and rate of each recording's drive, in the shape of `times`."""
+def drive_at(segments: Sequence[Segments], times) -> DriveState:
+    """Return the motion of each recording's drive, in the shape of `times`."""
     angle, rate = np.zeros(times.shape), np.ones(times.shape)
+    acceleration = np.zeros(times.shape)
     for row, part in enumerate(segments):
         if part.drive is not None:
             time, at = part.recording.time, times[row]
             angle[row] = np.interp(at, time, part.drive.angle)
             rate[row] = np.interp(at, time, part.drive.rate)
-    return angle, rate
+            acceleration[row] = np.interp(at, time, part.drive.acceleration.values)
+    return DriveState(angle, rate, acceleration)
 
 
 def mean_rates(segments: Sequence[Segments], edges: Edges):
@@ -43,7 +45,7 @@ def mean_rates(segments: Sequence[Segments], edges: Edges):
     return mean
 
 
-def input_at(segments: Sequence[Segments], channel: str, times):
+def input_at(segments: Sequence[Segments], channel: str, times) -> DriveState:
     """Return the input of each recording, held since the last sample, in the shape of
     `times`.
     """
@@ -52,10 +54,12 @@ def input_at(segments: Sequence[Segments], channel: str, times):
         time = part.recording.time
         last = np.searchsorted(time, times[row], side="right") - 1
         found[row] = part.recording[channel][np.maximum(last, 0)]
-    return found
+    return DriveState(found, np.zeros(times.shape), np.zeros(times.shape))
 
 
-def input_in_steps(segments: Sequence[Segments], channel: str, edges: Edges):
+def input_in_steps(
+    segments: Sequence[Segments], channel: str, edges: Edges
+) -> DriveState:
     """Return the mean and the slope of each recording's input in every step, `(r, k,
     n)`.
 
@@ -72,7 +76,7 @@ def input_in_steps(segments: Sequence[Segments], channel: str, edges: Edges):
         # by parts: the moment about the middle of a step
         moment = h / 2 * (first[:, 1:] + first[:, :-1]) - np.diff(second)
         slope[row] = 12 * moment / h**3
-    return mean, slope
+    return DriveState(mean, slope, np.zeros(step.shape))
 
 
 def _integrals(time, level, at):
@@ -87,20 +91,40 @@ def _integrals(time, level, at):
     return once, second[last] + first[last] * after + level[last] * after**2 / 2
 
 
-def drive_error(
-    part: Segments, length: float
-) -> tuple[float, float, float, float, float]:
-    """Return the standard errors of a drive: of its smoothed angle and rate, of the
-    integral of that rate, of the mean angle over one second, and of the rate of uniform
-    rotation over a piece of some `length` (s).
+class DriveError(NamedTuple):
+    """Standard errors of each recording's drive, `(r,)`.
 
-    A model of a system is driven at a uniform rate. The forces of an acceleration are
-    as large as those of an error `acceleration / (2 rate)` of the rate, for a base that
-    moves with the drive; they act over the time in which the rate changes, which is
-    longer than a piece.
+    A system without a field for the acceleration is driven at a uniform rate. The
+    forces of an acceleration are as large as those of an error `acceleration / (2
+    rate)` of the rate, for a base that moves with the drive. They act over the time in
+    which the rate changes, which is longer than a piece; the last two errors are
+    enlarged accordingly.
     """
+
+    angle: Numbers
+    """Of the smoothed angle (rad)."""
+    rate: Numbers
+    """Of the smoothed rate (rad/s)."""
+    turned: Numbers
+    """Of the integral of the smoothed rate (rad)."""
+    mean: Numbers
+    """Of the mean angle over one second (rad)."""
+    unsteadiness: Numbers
+    """Of the rate (rad/s), if the acceleration is neglected."""
+    acceleration: Numbers
+    """Of the acceleration (rad/s^2)."""
+
+
+def drive_error(segments: Sequence[Segments], steps: int) -> DriveError:
+    """Return the errors of the drives, for pieces of some number of samples."""
+    rows = [_errors(part, steps * part.recording.interval) for part in segments]
+    return DriveError(*np.array(rows).T)
+
+
+def _errors(part: Segments, length: float) -> tuple[float, ...]:
+    """Return the errors of one drive for pieces of some `length` (s)."""
     if part.drive is None:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
+        return (0.0,) * len(DriveError._fields)
     interval = part.recording.interval
     count = part.drive.window
     smooth = savgol_coeffs(count, 2)
@@ -108,27 +132,19 @@ def drive_error(
     weights = smooth, slope, np.cumsum(slope) * interval
     angle, rate, turned = (part.drive.noise * float(np.linalg.norm(w)) for w in weights)
     mean = part.drive.noise * float(np.sqrt(interval))
-    return angle, rate, turned, mean, _unsteadiness(part, length)
+    slow = part.drive.acceleration
+    error = slow.stderr * float(np.sqrt(max(1.0, slow.length / length)))
+    return angle, rate, turned, mean, _unsteadiness(part.drive, length), error
 
 
-def _unsteadiness(part: Segments, length: float) -> float:
+def _unsteadiness(drive: Drive, length: float) -> float:
     """Return the error of the rate (rad/s) that stands for its changes."""
-    drive, interval = part.drive, part.recording.interval
-    assert drive is not None
-    count = min(_STEADY * drive.window, len(drive.rate) // 3) // 2 * 2 - 1
-    if count < 5:
-        return 0.0
-    inside = slice(count // 2, -(count // 2))
-    slow = np.asarray(savgol_filter(drive.rate, count, 2))[inside]
-    change = np.asarray(savgol_filter(drive.rate, count, 2, deriv=1, delta=interval))
-    first = savgol_coeffs(drive.window, 2, deriv=1, delta=interval)
-    second = savgol_coeffs(count, 2, deriv=1, delta=interval)
-    noise = drive.noise * float(np.linalg.norm(np.convolve(first, second)))
+    slow = drive.acceleration
+    square = float(np.mean(slow.values**2)) - 2 * slow.stderr**2
     # a few independent values scatter by about as much as their mean
-    square = float(np.mean(change[inside] ** 2)) - 2 * noise**2
     if square <= 0:
         return 0.0
     acceleration = np.sqrt(square)
-    lasts = np.std(slow) / acceleration
+    lasts = np.std(drive.rate) / acceleration
     shares = np.sqrt(max(1.0, lasts / length))
     return float(acceleration / (2 * abs(drive.speed)) * shares)

@@ -204,16 +204,18 @@ def _columns(function, *args):
     return jax.vmap(pushed, out_axes=(None, -1))(*unit)
 
 
-def flown(model: Model, state, start, step, angle, rate, place, *, substeps: int):
-    end, nodes = fly(model, state, start, step, angle, rate, substeps)
-    along = start + (jnp.arange(angle.shape[0], dtype=float) + 0.5) * step, angle, rate
+def flown(model: Model, state, start, step, drive, place, *, substeps: int):
+    end, nodes = fly(model, state, start, step, drive, substeps)
+    numbers = jnp.arange(drive.angle.shape[0], dtype=float)
+    along = start + (numbers + 0.5) * step, drive
     return end, samples(model, nodes, start, step, place, along)
 
 
-def rested(model: Model, guess, start, step, angle, rate, place):
-    nodes = rest(model, guess, start, step, angle, rate)
-    along = start + jnp.arange(angle.shape[0], dtype=float) * step, angle, rate
-    return samples(model, nodes, start, step, place, [one[:-1] for one in along])
+def rested(model: Model, guess, start, step, drive, place):
+    nodes = rest(model, guess, start, step, drive)
+    along = start + jnp.arange(drive.angle.shape[0], dtype=float) * step, drive
+    along = jax.tree.map(lambda one: one[:-1], along)
+    return samples(model, nodes, start, step, place, along)
 
 
 def rested_all(model: Model, pieces: Pieces, extras: Extras):
@@ -227,7 +229,7 @@ def rested_all(model: Model, pieces: Pieces, extras: Extras):
 
 def flight_inputs(pieces: Pieces):
     part = pieces.flown
-    return part.start, part.step, pieces.angle, pieces.rate, part.place
+    return part.start, part.step, pieces.drive, part.place
 
 
 def rest_inputs(pieces: Pieces, extras: Extras):
@@ -236,22 +238,21 @@ def rest_inputs(pieces: Pieces, extras: Extras):
         extras.guess,
         part.start,
         part.step,
-        pieces.rest_angle,
-        pieces.rest_rate,
+        pieces.rest_drive,
         part.place,
     )
 
 
 def joint_inputs(pieces: Pieces):
-    return pieces.flown.start, pieces.angle_at, pieces.rate_at, pieces.joint
+    return pieces.flown.start, pieces.drive_at, pieces.joint
 
 
-def joint(model: Model, reach, before, state, t, angle, rate, kind):
+def joint(model: Model, reach, before, state, t, drive, kind):
     """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`."""
     inner = jnp.concatenate([*_flat(flight_joint(before, state))])
     # without an impact, the search for one must not affect the derivatives
     hit = kind == IMPACT
-    found = impact_joint(model, before, state, t, angle, rate, reach)
+    found = impact_joint(model, before, state, t, drive, reach)
     outer = jnp.concatenate([*_flat(found)])
     return jnp.where(hit, outer, jnp.where(kind == FLIGHT, inner, 0.0))
 

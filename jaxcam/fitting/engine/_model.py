@@ -1,9 +1,11 @@
 """The model to fit: a system, its drive and its sensors."""
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid import HybridSystem
@@ -87,13 +89,31 @@ class Sensor(eqx.Module):
         return jnp.asarray(self.observe(state))
 
 
+# numpy during assembly, JAX in the programs
+Numbers: TypeAlias = Array | np.ndarray
+
+
+class DriveState(NamedTuple):
+    """The motion of a drive at one time or in one step, or the level of an input."""
+
+    angle: Numbers
+    """Angle of the encoder (rad), or level of the input."""
+    rate: Numbers
+    """Rate of the drive (rad/s), or slope of the input."""
+    acceleration: Numbers
+    """Angular acceleration of the drive (rad/s^2)."""
+
+
 class Turning(eqx.Module):
     """A drive whose motion is measured, with the system fields for its speed and phase.
 
     When a recording is predicted, the speed field is set to the measured speed, and the
     phase field such that the drive angle is the measured angle plus the `phase` of the
     fitted system. This `phase` is therefore the offset of the drive angle from the
-    encoder reading.
+    encoder reading. A system whose vector field depends on the acceleration of the
+    drive, such as one on a base that the drive shakes, has a field for it that is
+    otherwise zero. Without this field, the effect of the acceleration is a random error
+    of the motion.
 
     Examples:
         >>> from jaxcam.fitting import Turning
@@ -107,15 +127,22 @@ class Turning(eqx.Module):
     """Selects the speed field of the system, such as `lambda s: s.speed`."""
     phase: Callable[[HybridSystem], Array] = eqx.field(static=True)
     """Selects the phase field of the system, such as `lambda s: s.phase`."""
+    acceleration: Callable[[HybridSystem], Array] | None = eqx.field(
+        static=True, default=None
+    )
+    """Selects the field of the angular acceleration of the drive (rad/s^2), such as
+    `lambda s: s.acceleration`.
+    """
 
-    def at(self, system, t, angle, rate):
-        """Return the system with its drive turning at `rate`, and at the encoder angle
-        `angle` at time `t`.
-        """
-        phase = self.phase(system) + angle - rate * t
-        return eqx.tree_at(
-            lambda s: (self.speed(s), self.phase(s)), system, (rate, phase)
+    def at(self, system, t, drive: DriveState):
+        """Return the system with its drive in some motion at time `t`."""
+        phase = self.phase(system) + drive.angle - drive.rate * t
+        system = eqx.tree_at(
+            lambda s: (self.speed(s), self.phase(s)), system, (drive.rate, phase)
         )
+        if self.acceleration is None:
+            return system
+        return eqx.tree_at(self.acceleration, system, jnp.asarray(drive.acceleration))
 
 
 class Input(eqx.Module):
@@ -137,14 +164,19 @@ class Input(eqx.Module):
     value: Callable[[HybridSystem], Array] = eqx.field(static=True)
     """Selects the field of the system, such as `lambda s: s.force`."""
 
-    def at(self, system, t, level, rate):
-        """Return the system with its input at `level`."""
-        del t, rate
-        return eqx.tree_at(self.value, system, level)
+    def at(self, system, t, drive: DriveState):
+        """Return the system with its input at a level."""
+        del t
+        return eqx.tree_at(self.value, system, drive.angle)
 
-    def during(self, system, middle, level, rate):
+    def during(self, system, middle, drive: DriveState):
         """Return the system as a function of time, within a step."""
-        return lambda t: self.at(system, t, level + rate * (t - middle), rate)
+
+        def at(t):
+            level = drive.angle + drive.rate * (t - middle)
+            return self.at(system, t, drive._replace(angle=level))
+
+        return at
 
 
 class Model(eqx.Module):
@@ -165,20 +197,34 @@ class Model(eqx.Module):
     drive: Turning | Input | None = None
     """The measured drive or input of the system, if there is one."""
 
-    def driven(self, t, angle, rate) -> HybridSystem:
+    @property
+    def sees_acceleration(self) -> bool:
+        """Whether the system has a field for the acceleration of its drive."""
+        return isinstance(self.drive, Turning) and self.drive.acceleration is not None
+
+    def driven(self, t, drive: DriveState) -> HybridSystem:
         """Return the system with its drive or input as measured at time `t`."""
         if self.drive is None:
             return self.system
-        return self.drive.at(self.system, t, angle, rate)
+        return self.drive.at(self.system, t, drive)
 
-    def during(self, middle, angle, rate) -> Callable[[Array], HybridSystem]:
+    def uniform(self, angle, rate) -> HybridSystem:
+        """Return the system with its drive turning uniformly, from an encoder angle
+        (rad) at time zero at a rate (rad/s).
+        """
+        # arrays, because numbers would be constants of a program compiled for each
+        # recording
+        state = DriveState(*(jnp.asarray(x, float) for x in (angle, rate, 0.0)))
+        return self.driven(0.0, state)
+
+    def during(self, middle, drive: DriveState) -> Callable[[Array], HybridSystem]:
         """Return the system as a function of time, within a step about `middle`.
 
         A drive turns uniformly within a step, which the system itself expresses.
         """
         if isinstance(self.drive, Input):
-            return self.drive.during(self.system, middle, angle, rate)
-        system = self.driven(middle, angle, rate)
+            return self.drive.during(self.system, middle, drive)
+        system = self.driven(middle, drive)
         return lambda t: system
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from ._linear import Extras, flight_inputs, flown
 from ._linearise import Layout, Point
-from ._model import filtered_channels
+from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
 from ._program import program
 from ._sharpness import states_only
@@ -143,14 +143,15 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
         part = pieces.flown
         times = part.start + part.step * part.place.shape[-2]
 
-        def landed(t, x, angle, rate):
-            system = model.driven(t, angle, rate)
+        def landed(t, x, drive):
+            system = model.driven(t, drive)
             after = system.impact(t, x[:size])
             if after.ndim == 2:
                 after = after[jnp.argmin(system.gap(t, x[:size]))]
             return jnp.concatenate([after, x[size:]])
 
-        hit = jax.vmap(landed)(times, ends, pieces.angle[:, -1], pieces.rate[:, -1])
+        last = DriveState(*(part[:, -1] for part in pieces.drive))
+        hit = jax.vmap(landed)(times, ends, last)
         return ends, hit
 
     return jax.vmap(one)(point.values, point.states, pieces)

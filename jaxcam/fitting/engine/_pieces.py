@@ -2,21 +2,22 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ...recordings import RecordingError, Segments
 from ...recordings.cut import measured_noise
 from ._driven_steps import (
     drive_at,
     drive_error,
+    DriveError,
     input_at,
     input_in_steps,
     mean_rates,
 )
+from ._model import DriveState, Numbers
 from ._piece_length import bearable_length
 
 
@@ -33,10 +34,6 @@ _SHARED = 4
 FREE, FLIGHT, IMPACT = 0, 1, 2
 # Half-width (samples) of the search for the time of an impact about the recorded one
 _REACH = 20.0
-
-
-# numpy during assembly, JAX in the programs
-Numbers: TypeAlias = Array | np.ndarray
 
 
 class Samples(eqx.Module):
@@ -58,14 +55,13 @@ class Pieces(eqx.Module):
 
     - `flown`, `rested`: samples in flight and in contact.
     - `joint`: the predecessor of each piece of flight: nothing, flight, or an impact.
-    - `exists`: false where padded. `angle`, `rate` `(r, k, n)`: the angle of the drive
-        in the middle of each step, and its mean rate; `angle_at`, `rate_at` `(r, k)`:
-        at the beginning of each piece. For a measured input, `angle` is its level and
-        `rate` is zero.
-    - `rest_angle`, `rest_rate` `(r, kc, n + 1)`: the drive at each node of contact.
+    - `exists`: false where padded.
+    - `drive` `(r, k, n)`: angle and acceleration of the drive in the middle of each
+        step, and its mean rate; or the mean and slope of an input. `drive_at` `(r, k)`:
+        at the beginning of each piece. `rest_drive` `(r, kc, n + 1)`: at each node of
+        contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
-    - `drive_error`: standard errors of each recording's drive, see
-        `_driven_steps.py`.
+    - `drive_error`: standard errors of each recording's drive.
     - `substeps`: number of parts into which a prediction divides each step.
     """
 
@@ -74,15 +70,17 @@ class Pieces(eqx.Module):
     joint: Int[Numbers, "r k"]
     exists: Bool[Numbers, "r k"]
     rest_exists: Bool[Numbers, "r kc"]
-    angle: Float[Numbers, "r k n"]
-    rate: Float[Numbers, "r k n"]
-    angle_at: Float[Numbers, "r k"]
-    rate_at: Float[Numbers, "r k"]
-    rest_angle: Float[Numbers, "r kc n1"]
-    rest_rate: Float[Numbers, "r kc n1"]
+    drive: DriveState
+    drive_at: DriveState
+    rest_drive: DriveState
     reach: Float[Numbers, " r"]
-    drive_error: Float[Numbers, "r 5"]
+    drive_error: DriveError
     substeps: int = eqx.field(static=True, default=1)
+
+    @property
+    def steps(self) -> int:
+        """Number of steps in each piece."""
+        return self.flown.place.shape[2]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -225,31 +223,24 @@ def gather(
     middle = (edges[..., 1:] + edges[..., :-1]) / 2
     nodes = rested.start[..., None] + rested.step[..., None] * np.arange(steps + 1)
     if measured is None:
-        angle, _ = drive_at(segments, middle)
-        rate = mean_rates(segments, edges)
-        angle_at, rate_at = drive_at(segments, flown.start)
-        rest_angle, rest_rate = drive_at(segments, nodes)
+        drive = drive_at(segments, middle)
+        drive = drive._replace(rate=mean_rates(segments, edges))
+        begin, rest = drive_at(segments, flown.start), drive_at(segments, nodes)
     else:
-        angle, rate = input_in_steps(segments, measured, edges)
-        angle_at = input_at(segments, measured, flown.start)
-        rest_angle = input_at(segments, measured, nodes)
-        rate_at, rest_rate = np.zeros(angle_at.shape), np.zeros(rest_angle.shape)
+        drive = input_in_steps(segments, measured, edges)
+        begin = input_at(segments, measured, flown.start)
+        rest = input_at(segments, measured, nodes)
     pieces = Pieces(
         flown,
         rested,
         joint,
         exists,
         rest_exists,
-        angle,
-        rate,
-        angle_at,
-        rate_at,
-        rest_angle,
-        rest_rate,
+        drive,
+        begin,
+        rest,
         np.array([_REACH * part.recording.interval for part in segments]),
-        np.array(
-            [drive_error(part, _PIECE * part.recording.interval) for part in segments]
-        ),
+        drive_error(segments, _PIECE),
     )
     return pieces, cuts
 

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ...hybrid import HybridSystem
 from ...hybrid.runge_kutta import array_step, RK4
-from ._model import augmented_field, filtered_channels, Model
+from ._model import augmented_field, DriveState, filtered_channels, Model
 
 
 # Steps of Newton's method
@@ -28,7 +28,7 @@ class Nodes(NamedTuple):
     right_rate: Float[Array, "n c"]
 
 
-def fly(model: Model, state, start, step, angle, rate, substeps: int = 1):
+def fly(model: Model, state, start, step, drive: DriveState, substeps: int = 1):
     """Integrate one piece of flight by the classical Runge-Kutta method.
 
     With `substeps`, each step is divided for the values, but not for the derivatives,
@@ -36,10 +36,10 @@ def fly(model: Model, state, start, step, angle, rate, substeps: int = 1):
 
     **Returns:** the state at its end `(n,)`, and its `Nodes`.
     """
-    states, fields = _nodes(model, state, start, step, angle, rate, 1)
+    states, fields = _nodes(model, state, start, step, drive, 1)
     if substeps > 1:
         still, begin = _constant((model, state))
-        fine = _nodes(still, begin, start, step, angle, rate, substeps)
+        fine = _nodes(still, begin, start, step, drive, substeps)
         states, fields = (
             coarse + jax.lax.stop_gradient(better - coarse)
             for better, coarse in zip(fine, (states, fields))
@@ -48,14 +48,14 @@ def fly(model: Model, state, start, step, angle, rate, substeps: int = 1):
     return states[-1], Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
 
 
-def _nodes(model: Model, state, start, step, angle, rate, substeps: int):
+def _nodes(model: Model, state, start, step, drive: DriveState, substeps: int):
     """Return the states at the ends of all steps `(n + 1, s)`, and their rates."""
     part = step / substeps
 
     def advance(x, inputs):
-        number, a, w = inputs
+        number, here = inputs
         t0 = start + number * step
-        system_at = model.during(t0 + step / 2, a, w)
+        system_at = model.during(t0 + step / 2, here)
         if substeps == 1:
             x1, k1 = runge_kutta(model, system_at, t0, x, step)
             return x1, (x, k1)
@@ -66,10 +66,12 @@ def _nodes(model: Model, state, start, step, angle, rate, substeps: int):
         k1 = augmented_field(model, system_at(t0), t0, x)
         return jax.lax.fori_loop(0, substeps, inner, x), (x, k1)
 
-    numbers = jnp.arange(angle.shape[0], dtype=float)
-    end, (states, fields) = jax.lax.scan(advance, state, (numbers, angle, rate))
-    t1 = start + angle.shape[0] * step
-    system = model.during(t1 - step / 2, angle[-1], rate[-1])(t1)
+    count = drive.angle.shape[0]
+    numbers = jnp.arange(count, dtype=float)
+    end, (states, fields) = jax.lax.scan(advance, state, (numbers, drive))
+    t1 = start + count * step
+    final = DriveState(*(part[-1] for part in drive))
+    system = model.during(t1 - step / 2, final)(t1)
     last = augmented_field(model, system, t1, end)
     states = jnp.concatenate([states, end[None]])
     return states, jnp.concatenate([fields, last[None]])
@@ -96,7 +98,7 @@ def runge_kutta(model: Model, system_at, t, x, h):
     return after, first
 
 
-def rest(model: Model, guess, start, step, angle, rate):
+def rest(model: Model, guess, start, step, drive: DriveState):
     """Return `Nodes` of one piece of contact; `guess` `(n,)` is a state near the
     surface.
     """
@@ -104,11 +106,11 @@ def rest(model: Model, guess, start, step, angle, rate):
     def seen(x):
         return jnp.stack([s.seen(x) for s in model.sensors.values()])
 
-    def channel(t, a, w):
-        return jax.jvp(seen, *contact_state(model.driven(t, a, w), t, guess))
+    def channel(t, here):
+        return jax.jvp(seen, *contact_state(model.driven(t, here), t, guess))
 
-    times = start + step * jnp.arange(angle.shape[0], dtype=float)
-    values, rates = jax.vmap(channel)(times, angle, rate)
+    times = start + step * jnp.arange(drive.angle.shape[0], dtype=float)
+    values, rates = jax.vmap(channel)(times, drive)
     return Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
 
 
@@ -175,8 +177,8 @@ def _least(slopes, residual):
 def samples(model: Model, nodes: Nodes, start, step, place, along):
     """Sample every channel, shape `(n, m, c)`, by cubic Hermite polynomials.
 
-    **Arguments:** the position `along` each step at which the drive is given, and its
-    angle and rate.
+    **Arguments:** the position `along` each step at which the drive is given, and the
+    drive there.
     """
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]
@@ -205,8 +207,8 @@ def samples(model: Model, nodes: Nodes, start, step, place, along):
 def _errors(model: Model, start, step, place, along, value, slope):
     """Return systematic errors of the sensors at each sample, `(n, m, c)`."""
 
-    def one_step(number, places, when, angle, rate, values, slopes):
-        system = model.driven(when, angle, rate)
+    def one_step(number, places, when, drive, values, slopes):
+        system = model.driven(when, drive)
 
         def sample(u, value, slope):
             t = start + (number + u) * step
@@ -219,8 +221,8 @@ def _errors(model: Model, start, step, place, along, value, slope):
         return jax.vmap(sample)(places, values, slopes)
 
     numbers = jnp.arange(place.shape[0], dtype=float)
-    when, angle, rate = along
-    return jax.vmap(one_step)(numbers, place, when, angle, rate, value, slope)
+    when, drive = along
+    return jax.vmap(one_step)(numbers, place, when, drive, value, slope)
 
 
 class Joint(NamedTuple):
@@ -239,14 +241,14 @@ def flight_joint(end, state) -> Joint:
     return Joint(state - end, jnp.zeros_like(end[0]))
 
 
-def impact_joint(model: Model, end, state, t, angle, rate, reach) -> Joint:
+def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint:
     """Return the joint between two flights, at the time at which they have the same
     gap.
 
     No event search is needed: both flights and the impact between them are known.
     """
     size = end.shape[0] - len(filtered_channels(model))
-    system = model.driven(t, angle, rate)
+    system = model.driven(t, drive)
 
     flights = jnp.stack([end, state])
 

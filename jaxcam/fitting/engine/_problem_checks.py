@@ -28,16 +28,15 @@ def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) ->
 def _rates(layout: Layout, point: Point, pieces: Pieces):
     """Return the rate of change at the initial state of each piece."""
 
-    def one(values, states, start, angle, rate):
+    def one(values, states, start, drive):
         model = layout.at(values)
 
-        def at(state, t, angle, rate):
-            return augmented_field(model, model.driven(t, angle, rate), t, state)
+        def at(state, t, drive):
+            return augmented_field(model, model.driven(t, drive), t, state)
 
-        return jax.vmap(at)(states, start, angle, rate)
+        return jax.vmap(at)(states, start, drive)
 
-    drive = pieces.flown.start, pieces.angle_at, pieces.rate_at
-    return jax.vmap(one)(*point, *(jnp.asarray(part) for part in drive))
+    return jax.vmap(one)(*point, jnp.asarray(pieces.flown.start), pieces.drive_at)
 
 
 def refuse_repeated(parameters) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ._linear import Extras, Sharpness
 from ._linearise import assemble, Layout, Point
-from ._model import augmented_field, filtered_channels
+from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
 from ._predict import fly, smallest_gap
 from ._program import program
@@ -67,7 +67,7 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
     floor = JOINT / jnp.sqrt(usual)
     flight = jnp.broadcast_to(floor, one.shape)
     piece = flight / JOINT
-    if np.any(np.asarray(pieces.drive_error) > 0):
+    if np.any(np.asarray(pieces.drive_error.angle) > 0):
         # a component determined by the drive is known as accurately as the drive
         by_drive = _drive_in_flight(layout, pieces, point)
         flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
@@ -90,7 +90,7 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """
     # as wide as a fit of all parameters, whose program is then already compiled; for
     # many steps, a separate program soon repays its compilation time
-    few = pieces.angle.shape[-1] <= _FEW_STEPS
+    few = pieces.steps <= _FEW_STEPS
     width = width_of(len(layout.places)) if few else _WIDTH
     none = jnp.zeros((pieces.joint.shape[0], width), dtype=int)
     scales = jnp.zeros(none.shape, dtype=float)
@@ -146,33 +146,36 @@ def _variances(ss, before):
 @program
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     """Return the error of each piece's initial state, `(r, k, n)`, due to the noise of
-    the drive during the previous piece, and to its changes of rate.
+    the drive during the previous piece, and to its acceleration.
 
-    The noise of the samples is independent, that of the smoothed angle and rate is not.
+    The noise of the samples is independent, that of the smoothed angle, rate and
+    acceleration is not.
     Integration by parts turns the effect of the rate into one of the angle; what
     remains at the ends of a piece cancels between neighbours.
     """
 
-    def one(values, error, states, start, step, angles, rates):
+    def one(values, error, states, start, step, drives):
         model = layout.at(values)
-        mean, unsteady = error[3:]
 
-        def spread(state, start, step, angle, rate):
-            def end(shifts):
-                turned = angle + shifts[0], rate + shifts[1]
-                return fly(model, state, start, step, *turned)[0]
+        def spread(state, start, step, drive):
+            def end(drive):
+                return fly(model, state, start, step, drive)[0]
 
-            slopes = jax.jacfwd(end)(jnp.zeros((2, *angle.shape)))
-            weights = slopes[:, 0] - jnp.gradient(slopes[:, 1], axis=-1) / step
-            noise = mean**2 * jnp.sum(weights**2, axis=-1) / step
-            return jnp.sqrt(noise + (unsteady * jnp.sum(slopes[:, 1], axis=-1)) ** 2)
+            angle, rate, acceleration = jax.jacfwd(end)(drive)
+            weights = angle - jnp.gradient(rate, axis=-1) / step
+            noise = error.mean**2 * jnp.sum(weights**2, axis=-1) / step
+            if model.sees_acceleration:
+                lasting = error.acceleration * jnp.sum(acceleration, axis=-1)
+            else:
+                lasting = error.unsteadiness * jnp.sum(rate, axis=-1)
+            return jnp.sqrt(noise + lasting**2)
 
-        found = jax.vmap(spread)(states, start, step, angles, rates)
+        found = jax.vmap(spread)(states, start, step, drives)
         return jnp.concatenate([found[:1], found[:-1]])
 
     part = pieces.flown
     known = point.values, pieces.drive_error, point.states, part.start, part.step
-    arrays = (jnp.asarray(x) for x in (*known, pieces.angle, pieces.rate))
+    arrays = jax.tree.map(jnp.asarray, (*known, pieces.drive))
     return jax.vmap(one)(*arrays)
 
 
@@ -182,42 +185,43 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
     drive.
     """
 
-    def one(values, state, t, angle, rate, error):
+    def one(values, state, t, drive, error):
         model = layout.at(values)
         size = state.shape[0] - len(filtered_channels(model))
 
         def by_rate(x):
             def field(rate):
-                return augmented_field(model, model.driven(t, angle, rate), t, x)
+                system = model.driven(t, drive._replace(rate=rate))
+                return augmented_field(model, system, t, x)
 
-            return jax.jacfwd(field)(rate)
+            return jax.jacfwd(field)(drive.rate)
 
-        def landed(drive):
+        def landed(off):
             # the integrated noise of the rate shifts the state in flight
-            x = state + by_rate(state) * drive[2]
-            system = model.driven(t, drive[0], drive[1])
+            x = state + by_rate(state) * off[2]
+            shifted = drive.angle + off[0], drive.rate + off[1], drive.acceleration
+            system = model.driven(t, DriveState(*shifted))
             after = system.impact(t, x[:size])
             gap = smallest_gap(system, t, x[:size])
             if after.ndim == 2:
                 after = after[jnp.argmin(system.gap(t, x[:size]))]
             after = jnp.concatenate([after, x[size:]])
-            after = after - by_rate(after) * drive[2]
+            after = after - by_rate(after) * off[2]
             return jnp.concatenate([after, gap[None]])
 
         def gap_of(x):
-            system = model.driven(t, angle, rate)
+            system = model.driven(t, drive)
             return smallest_gap(system, t, x[:size])
 
-        jacobian = jax.jacfwd(landed)(jnp.stack([angle, rate, jnp.zeros_like(angle)]))
-        spread = jnp.sqrt(jacobian**2 @ error[:3] ** 2)
+        jacobian = jax.jacfwd(landed)(jnp.zeros(3))
+        errors = jnp.stack([error.angle, error.rate, error.turned])
+        spread = jnp.sqrt(jacobian**2 @ errors**2)
         return jax.grad(gap_of)(state), spread
 
-    along = jax.vmap(one, in_axes=(None, 0, 0, 0, 0, None))
+    along = jax.vmap(one, in_axes=(None, 0, 0, 0, None))
     return jax.vmap(along)(
         point.values,
         point.states,
         jnp.asarray(pieces.flown.start),
-        jnp.asarray(pieces.angle_at),
-        jnp.asarray(pieces.rate_at),
-        jnp.asarray(pieces.drive_error),
+        *jax.tree.map(jnp.asarray, (pieces.drive_at, pieces.drive_error)),
     )

@@ -53,10 +53,7 @@ def _still(model: Model, part: Segments):
     """
     if part.drive is None:
         return model.system
-    # arrays, because numbers would be constants of a program compiled for each
-    # recording
-    angle, rate = (jnp.asarray(x) for x in (part.drive.phase, part.drive.speed))
-    return model.driven(0.0, angle, rate)
+    return model.uniform(part.drive.phase, part.drive.speed)
 
 
 def _with_samples(side: list[Span]):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ._linear import Extras
 from ._linearise import Layout, Point
-from ._model import Input, Model
+from ._model import DriveState, Input, Model
 from ._pieces import Pieces
 from ._predict import fly
 from ._program import program
@@ -95,13 +95,13 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
 def _off_middles(layout: Layout, pieces: Pieces, point: Point):
     """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
 
-    def one(model, substeps, state, start, step, angle, rate):
+    def one(model, substeps, state, start, step, drive):
         del substeps
         # drive and input are linear within a step: their values in its halves
-        angles, rates = (jnp.repeat(part, 2, axis=-1) for part in (angle, rate))
-        quarter = jnp.tile(jnp.array([-0.25, 0.25]), angle.shape[-1]) * step
-        angles = angles + quarter * rates
-        _, halves = fly(model, state, start, step / 2, angles, rates)
+        twice = DriveState(*(jnp.repeat(part, 2, axis=-1) for part in drive))
+        quarter = jnp.tile(jnp.array([-0.25, 0.25]), drive.angle.shape[-1]) * step
+        twice = twice._replace(angle=twice.angle + quarter * twice.rate)
+        _, halves = fly(model, state, start, step / 2, twice)
         left, middle, right = halves.left[::2], halves.right[::2], halves.right[1::2]
         bend = (halves.left_rate[::2] - halves.right_rate[1::2]) * step / 8
         return jnp.max(jnp.abs((left + right) / 2 + bend - middle), axis=0)
@@ -117,6 +117,5 @@ def _of_each(layout: Layout, pieces: Pieces, point: Point, one):
         model = layout.at(values)
         return jax.vmap(lambda *piece: one(model, pieces.substeps, *piece))(*inputs)
 
-    drive = (part.start, part.step, pieces.angle, pieces.rate)
-    inputs = (jnp.asarray(one) for one in drive)
-    return jax.vmap(record)(point.values, point.states, *inputs)
+    times = jnp.asarray(part.start), jnp.asarray(part.step)
+    return jax.vmap(record)(point.values, point.states, *times, pieces.drive)
