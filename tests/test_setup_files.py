@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, HealthCheck, settings, strategies as st
 
 from jaxcam.fitting import Input, is_setup, Problem, read_setup, Turning
+from jaxcam.fitting.engine import DriveState
 from jaxcam.fitting.own_systems import (
     classes_beside,
     Field,
@@ -87,8 +88,10 @@ def test_textbook_rigs_with_a_drive_can_be_stated(name):
     for one in setup.parameters:
         assert one.tolerance > 0 and jnp.isfinite(one.where(setup.model))
     model = setup.model
-    moved = model.drive.at(model.system, 2.0, 7.0, 3.0)
+    moved = model.driven(2.0, DriveState(*jnp.array([7.0, 3.0, 0.5])))
     assert float(moved.speed) == 3.0 and float(moved.phase) == pytest.approx(1.0)
+    assert model.sees_acceleration == hasattr(moved, "acceleration")
+    assert not model.sees_acceleration or float(moved.acceleration) == 0.5
 
 
 def test_a_stage_with_a_measured_input_can_be_stated():

@@ -10,7 +10,7 @@ from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
 
 # Cost per sample, or per component of a joint, that noise does not explain: with noise
 # alone it is 1 on average, and within a few per cent of 1 for thousands of samples
-_PIECE, _JOINT, _MEAN = 4.0, 9.0, 9.0
+_PIECE, _JOINT, _MEAN = 4.0, 9.0, 4.0
 # Fraction of the pieces that must be below it: one bad recording of many is an outlier
 _USUAL = 0.75
 # Tolerance for reaching a bound, relative to the parameter's scale

@@ -80,7 +80,7 @@ class Pieces(eqx.Module):
     @property
     def steps(self) -> int:
         """Number of steps in each piece."""
-        return self.flown.place.shape[2]
+        return self.flown.place.shape[-2]
 
 
 @dataclasses.dataclass(frozen=True)
