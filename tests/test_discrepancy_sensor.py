@@ -22,6 +22,7 @@ from jaxcam.discrepancy.terms import (
     WithTerms,
 )
 from jaxcam.fitting import Model, Parameter, read_setup, Sensor
+from jaxcam.fitting.engine import DriveState
 from jaxcam.fitting.engine._predict import fly, samples
 from jaxcam.models import ImpactOscillator
 
@@ -50,9 +51,9 @@ def _seen(model: Model):
     """Both channels at samples of one piece of flight of 0.4 s, and when they are."""
     start, step, steps = 0.2, 0.1, 4
     place = jnp.tile(jnp.array([0.0, 0.3, 0.8]), (steps, 1))
-    drive = jnp.zeros(steps), jnp.zeros(steps)
-    _, nodes = fly(model, jnp.array([-1.0, 0.3]), start, step, *drive)
-    along = start + (jnp.arange(steps, dtype=float) + 0.5) * step, *drive
+    drive = DriveState(jnp.zeros(steps), jnp.zeros(steps), jnp.zeros(steps))
+    _, nodes = fly(model, jnp.array([-1.0, 0.3]), start, step, drive)
+    along = start + (jnp.arange(steps, dtype=float) + 0.5) * step, drive
     found = samples(model, nodes, start, step, place, along)
     time = start + step * (jnp.arange(steps, dtype=float)[:, None] + place)
     return np.asarray(found).reshape(-1, 2), np.asarray(time).ravel()

@@ -41,7 +41,7 @@ def test_a_slow_impact_at_the_turning_point_of_a_stiff_oscillation_is_found():
 def bouncing():
     """A pendulum that bounces ever lower, and leaves the wall again."""
     setup = read_setup(RIGS / "pendulum_wall.toml")
-    rng = np.random.default_rng(27)
+    rng = np.random.default_rng(45)
     while True:
         truth = drawn(setup, rng)
         try:
@@ -52,13 +52,13 @@ def bouncing():
 
 
 def test_a_flight_begins_after_the_last_low_bounce(bouncing):
-    """The bounce before it is 4 noises high; the model shows where it ends."""
+    """The bounce before it is 2.3 noises high; the model shows where it ends."""
     setup, runs, motions = bouncing
-    part = setup.segments(runs)[2]
-    times = motions[2].struck[:, 0]
-    last = times[(times > 5.15) & (times < 5.2)]
+    part = setup.segments(runs)[3]
+    times = motions[3].struck[:, 0]
+    last = times[(times > 0.48) & (times < 0.5)]
     assert len(last) == 1
-    (flight,) = [one for one in part.flights if one.start.time < 5.4 < one.stop.time]
+    (flight,) = [one for one in part.flights if one.start.time < 0.6 < one.stop.time]
     assert last[0] < flight.start.time < last[0] + 0.03
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from jaxcam.fitting import fit, Parameter, Problem, Sensor
+from jaxcam.fitting.engine import DriveState
 from jaxcam.fitting.engine._linearise import Layout
 from jaxcam.fitting.engine._model import Model
 from jaxcam.fitting.engine._pieces import _PIECE, spans
@@ -121,7 +122,8 @@ class Spring(HybridSystem):
 def _ends(stiffness, substeps):
     model = Model(Spring(stiffness), {"x": Sensor(0, noise=1e-3)})
     start, step, still = jnp.array([1.0, 0.0]), jnp.asarray(0.1), jnp.zeros(10)
-    return fly(model, start, jnp.asarray(0.0), step, still, still, substeps)
+    drive = DriveState(still, still, still)
+    return fly(model, start, jnp.asarray(0.0), step, drive, substeps)
 
 
 def test_substeps_refine_the_values_and_leave_the_derivatives():
