@@ -10,8 +10,8 @@ from jaxtyping import Float
 # Fractions of the largest singular value, with columns of unit length, below which a
 # combination is certainly, or possibly, due to rounding
 _BLIND, _DOUBTFUL = 4e-6, 3e-3
-# Growth of information that comes from the states alone, if they are held a hundred
-# times as firmly
+# A combination whose information grows by more than this factor if the eliminated
+# states are regularised a hundred times as strongly is not determined by the data
 _GROWS = 10.0
 # Members of a combination are named if they are at least this fraction of the largest
 _MEMBER = 0.1
@@ -76,7 +76,7 @@ def unconstrained(
         )
         for value, vector in zip(values, vectors.T):
             rounding = value <= _BLIND**2 * len(rows) * values[-1]
-            # a state held only by rounding contributes information
+            # a state that only rounding errors determine appears to give information
             lent = vector @ held @ vector > _GROWS * max(value, 0.0)
             if not (rounding or (value <= _DOUBTFUL**2 * values[-1] and lent)):
                 continue

@@ -127,7 +127,7 @@ def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
     """Yield operations with a corner and their places.
 
     **Arguments:** the program; which of its arguments depend on time or state; and, for
-    what lies inside a function of `jax.numpy`, the name and place of its call.
+    operations inside a function of `jax.numpy`, the name and place of its call.
 
     Returns which of the results depend on time or state.
     """

@@ -220,7 +220,7 @@ def _check(batched, shared, settings, t0, period, states) -> None:
         lane = int(np.argmin(np.where(behind, nearest, np.inf)))
         raise ValueError(
             f"gap is negative ({float(nearest[lane]):.1e}) at t0 in trajectory {lane}; "
-            "start outside the constraint"
+            "start with every gap at zero or above"
         )
 
 

@@ -71,8 +71,8 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
         raise ValueError("the gap is not finite at t0; check the state and parameters")
     if behind:
         raise ValueError(
-            f"gap is negative ({np.min(values):.1e}) at t0; start outside the "
-            "constraint, or pass state=None to start at the release point"
+            f"gap is negative ({np.min(values):.1e}) at t0; start with every gap at "
+            "zero or above, or pass state=None to start at the release point"
         )
 
 
@@ -178,7 +178,7 @@ def _check_shapes(system, t0, state) -> None:
 
 
 def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
-    """Return what the functions of switching surfaces return."""
+    """Check the results of the functions of switching surfaces."""
     switch = _shape(system, "switching", t0, state)
     if len(switch.shape) > 1 or switch.shape == (0,):
         raise ValueError(

@@ -95,8 +95,8 @@ def reduced(columns: Columns, blocks: Blocks):
 
 
 def held_firmer(columns: Columns, blocks: Blocks):
-    """Return the `reduced` information with the states held a hundred times as firmly.
-    Any part that grows does not come from the data.
+    """Return the `reduced` information with the states regularised a hundred times as
+    strongly. Any part that grows does not come from the data.
     """
     return gathered(columns, eliminate_states(blocks, jnp.asarray(100 * LEAST)))[0]
 

@@ -24,8 +24,9 @@ LEAST = 1e-13
 class Reduced(NamedTuple):
     """Normal equations of the parameters with the states eliminated.
 
-    For each record: `information` `(m, m)`, `score` `(m,)`; `gain` `(k, n, m + 1 + n)`
-    expresses each state in terms of the parameters, a constant, and the next state.
+    For each recording: `information` `(m, m)`, `score` `(m,)`; `gain`
+    `(k, n, m + 1 + n)` expresses each state in terms of the parameters, a constant, and
+    the next state.
     """
 
     information: Float[Array, "r m m"]

@@ -116,7 +116,7 @@ class Expansion(eqx.Module):
 
 
 class Blocks(NamedTuple):
-    """Normal equations of the pieces of one record: information and score.
+    """Normal equations of the pieces of one recording: information and score.
 
     `ss, sp, s` belong to the state of each piece; `pp, p` to the parameters, summed
     over all pieces and joints; `before` couples the state of a piece to that of the
@@ -236,7 +236,7 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
 
 
 def chained(found: LinearPieces) -> Blocks:
-    """Return the normal equations of one record: its pieces and joints summed.
+    """Return the normal equations of one recording: its pieces and joints summed.
 
     Args:
         found: The linear pieces.

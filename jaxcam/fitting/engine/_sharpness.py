@@ -46,9 +46,7 @@ def shared_width(free: int, most: int) -> int:
 
 
 def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
-    """Return the sharpness of the joints, as far as the drive and the samples resolve
-    it.
-    """
+    """Return the standard errors of the joints, from the drive and the samples."""
     records, width = pieces.joint.shape
     size = point.states.shape[-1]
     one = jnp.ones((records, width, size))

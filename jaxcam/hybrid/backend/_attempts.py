@@ -55,7 +55,7 @@ class Layout(NamedTuple):
 
 
 def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
-    """Return the arrays of a pytree as 64-bit floats: `(size,)`, or `(lanes, size)`.
+    """Return the arrays of a pytree as 64-bit floats: `(size,)`, or `(elements, size)`.
 
     **Raises:** `Lacking` if an element is not a number.
     """
@@ -175,9 +175,9 @@ class Attempts:
     ) -> int:
         """Run batch elements to the end, or to `limit` attempts each.
 
-        **Arguments:** values of system and plan, `(k,)` and `(lanes, k)`; values of the
-        states, `(lanes, k)`, which are changed in place; the log, `(lanes, places, k)`,
-        which begins with place `first`; and a callback between calls.
+        **Arguments:** values of system and plan, `(k,)` and `(elements, k)`; values of
+        the states, `(elements, k)`, which are changed in place; the log,
+        `(elements, places, k)`, which begins with place `first`; and a callback between calls.
 
         **Returns:** the number of attempts in each slot.
         """
@@ -203,7 +203,7 @@ _LOCK = threading.Lock()
 def attempts_of(key: Key) -> Attempts:
     """Return the loop for a key, compiled once.
 
-    **Raises:** `Lacking` if the program needs an operation that the back end does not
+    **Raises:** `Lacking` if the program needs an operation that the backend does not
     have.
     """
     with _LOCK:
@@ -224,7 +224,7 @@ def say_lacking(lacking: Lacking, demanded: bool) -> None:
     **Raises:** `ValueError`.
     """
     text = (
-        "the LLVM back end cannot compile this system, because it does not "
+        "the LLVM backend cannot compile this system, because it does not "
         f'support {lacking}; Settings(backend="auto") runs the system with XLA, '
         "which is slower"
     )
@@ -233,6 +233,6 @@ def say_lacking(lacking: Lacking, demanded: bool) -> None:
     if str(lacking) not in _SAID:
         _SAID.add(str(lacking))
         _LOG.warning(
-            ("the system runs with XLA, because the LLVM back end does not support %s"),
+            ("the system runs with XLA, because the LLVM backend does not support %s"),
             lacking,
         )

@@ -87,7 +87,7 @@ class Mapped:
 
     **Arguments:** a function of two arrays of 64-bit floats, and their sizes.
 
-    **Raises:** `Lacking` with the name of an operation that the back end does not have.
+    **Raises:** `Lacking` with the name of an operation that the backend does not have.
     """
 
     def __init__(self, function, shared: int, own: int, width: int | None = None):

@@ -25,7 +25,7 @@ _KINDS = {
 
 
 class Lacking(Exception):
-    """The name of an operation that a program needs and this back end does not have."""
+    """The name of an operation that a program needs and this backend does not have."""
 
 
 def kind_of(dtype) -> Any:

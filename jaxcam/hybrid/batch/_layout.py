@@ -1,8 +1,7 @@
-"""Store many batch elements (lanes) as one matrix, and compile the loop that works on
-it.
+"""Store many batch elements as one matrix, and compile the loop that works on it.
 
 Each chunk is one dispatch with few arrays. Passing a whole system and all leaves of a
-lane instead would take four times as long, which is as long as 64 lanes need for a
+batch element instead would take four times as long: as long as 64 elements need for a
 chunk.
 """
 
@@ -20,18 +19,18 @@ from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
 from ..lowering import one_kernel, Packed, without_library
 
 
-# ratio of starts computed at once to lanes that run at once
+# ratio of starts computed at once to batch elements that run at once
 _AT_ONCE = 16
 
 
 class LaneLayout(NamedTuple):
-    """The matrix rows that hold each number of a lane, and their types."""
+    """The matrix rows that hold each number of a batch element, and their types."""
 
     rows: LoopState
     dtypes: tuple
 
     def unpacked(self, numbers) -> LoopState:
-        """Return the lane with these numbers."""
+        """Return the batch element with these numbers."""
         leaves = [
             number.astype(dtype)
             for number, dtype in zip(numbers, self.dtypes, strict=True)
@@ -39,13 +38,13 @@ class LaneLayout(NamedTuple):
         return jax.tree.unflatten(jax.tree.structure(self.rows), leaves)
 
     def example(self) -> LoopState:
-        """Return the shapes of the scalars of a lane."""
+        """Return the shapes of the scalars of a batch element."""
         kinds = [jax.ShapeDtypeStruct((), dtype) for dtype in self.dtypes]
         return jax.tree.unflatten(jax.tree.structure(self.rows), kinds)
 
 
 def packed(lane: LoopState):
-    """Return all numbers of one or more lanes as rows of 64-bit floats."""
+    """Return all numbers of one or more batch elements as rows of 64-bit floats."""
     return jnp.stack([jnp.asarray(leaf, jnp.float64) for leaf in jax.tree.leaves(lane)])
 
 
@@ -56,21 +55,21 @@ def layout_of(lane: LoopState) -> LaneLayout:
 
 
 class Lanes(NamedTuple):
-    """The batch to run: a system, the parameters that differ between lanes, and the
-    starts.
+    """The batch to run: a system, the parameters that differ between batch elements,
+    and the starts.
     """
 
     system: HybridSystem
     where: Callable | None
-    """The leaves selected by `where` take the `values`, `(lanes,)` or `(lanes, k)`;
-    both may be `None`.
+    """The leaves selected by `where` take the `values`, `(elements,)` or
+    `(elements, k)`; both may be `None`.
     """
     values: np.ndarray | None
     states: np.ndarray
-    """Initial states, `(lanes, n)`."""
+    """Initial states, `(elements, n)`."""
 
     def some(self, which: slice) -> "Lanes":
-        """Return some of the lanes."""
+        """Return some of the batch elements."""
         values = None if self.values is None else self.values[which]
         return self._replace(values=values, states=self.states[which])
 
@@ -79,7 +78,7 @@ class Horizon(NamedTuple):
     """The time span to run: `number` periods of length `period` (s), starting at `t0`
     (s).
 
-    By default, the period is that of the system in each lane.
+    By default, the period is that of the system in each batch element.
     """
 
     t0: Any
@@ -88,21 +87,23 @@ class Horizon(NamedTuple):
 
 
 class LaneStart(NamedTuple):
-    """Initial lanes, one column each, and the arrays with which they are run."""
+    """Initial batch elements, one column each, and the arrays for running them."""
 
     slots: LaneLayout
     numbers: np.ndarray
     own: Any
-    """Parts of the system and the plan that differ between lanes, and shared parts."""
+    """Parts of the system and the plan that differ between batch elements, and shared
+    parts.
+    """
     shared: Any
     static: Any
 
 
 def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneStart:
-    """Return the start of the lanes, of which `width` will run at a time."""
+    """Return the start of the batch elements, of which `width` will run at a time."""
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
-    # padded, so that two compiled programs suffice for any number of lanes
+    # padded, so that two compiled programs suffice for any number of batch elements
     part_size = width if count <= 2 * width else _AT_ONCE * width
     for first in range(0, count, part_size):
         some = np.minimum(np.arange(first, first + part_size), count - 1)
@@ -123,7 +124,8 @@ def compiled_chunk(
     start: LaneStart, own: Packed, shared: Packed, rows: int, row: Callable
 ):
     """Return the compiled loop, a function of own and shared parts (each as numbers and
-    separate leaves) and of the numbers of the lanes, which returns numbers and log.
+    separate leaves) and of the numbers of the batch elements, which returns numbers and
+    log.
 
     It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`.
     The log has one array `(rows, slots)` for each number in a row; the first contains

@@ -1,6 +1,4 @@
-"""Run a group of lanes in fewer batch positions; each ended lane is replaced by the
-next.
-"""
+"""Run many batch elements in fewer positions, which are refilled when one ends."""
 
 from typing import NamedTuple
 
@@ -27,23 +25,23 @@ class Chunking(NamedTuple):
     """
 
     width: int
-    """Number of lanes that run at a time."""
+    """Number of batch elements that run at a time."""
     rows: int
-    """Number of attempts in a chunk, after which ended lanes are replaced."""
+    """Number of attempts in a chunk, after which ended batch elements are replaced."""
     max_steps: int
-    """Maximum number of attempts of one lane."""
+    """Maximum number of attempts of one batch element."""
 
 
 def run_refilled(
     lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, table: Table
 ):
-    """Run some lanes; each lane that ends is replaced by the next.
+    """Run some batch elements; each one that ends is replaced by the next.
 
-    Lanes are independent, so their order and grouping do not change any result. The
-    logs of all lanes are stored in the `table`.
+    Elements are independent, so their order and grouping do not change any result. The
+    logs of all batch elements are stored in the `table`.
 
     Returns:
-        Impacts, attempts and result codes, each `(lanes,)`.
+        Impacts, attempts and result codes, each `(elements,)`.
     """
     start = start_lanes(lanes, horizon, settings, chunking.width)
     if settings.compiles:
@@ -55,7 +53,7 @@ def run_refilled(
 
 
 def _by_llvm(start: LaneStart, max_steps: int, table: Table):
-    """Run the loop as LLVM code, which replaces ended lanes itself."""
+    """Run the loop as LLVM code, which replaces ended batch elements itself."""
     count = start.numbers.shape[1]
     shared, shared_layout = laid_out(start.shared)
     own, own_layout = laid_out(start.own, count)
@@ -82,8 +80,8 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
     chunk = compiled_chunk(start, packed_own, packed_shared, rows, table.row)
     place = start.slots.rows
     ends = np.zeros((count, 3), dtype=int)
-    # spread evenly, to estimate the cost of the others; positions without a lane of
-    # their own hold the last one and are not run
+    # spread evenly, to estimate the cost of the others; positions without a batch
+    # element of their own hold the last one and are not run
     first = np.linspace(0, count - 1, min(width, count)).astype(int)
     work, used = np.full(width, count - 1), np.zeros(width)
     work[: len(first)], running = first, np.arange(width) < count
@@ -102,7 +100,7 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
         numbers = np.array(numbers)
         counted = [place.status, place.impacts, place.steps]
         ends[work[over]] = numbers[counted].T[over]
-        # a lane that has used up its attempts does not change
+        # a batch element that has used up its attempts does not change
         numbers[place.status, over], running[over] = FINISHED, False
         if not sorted_yet:
             waiting = costly_first(waiting, work, used, numbers[place.stops])
@@ -116,10 +114,12 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
 
 
 def costly_first(waiting, work, used, stops):
-    """Sort the waiting lanes by expected number of attempts, the largest first.
+    """Sort the waiting batch elements by expected number of attempts, the largest
+    first.
 
-    A long lane that starts last leaves the other positions idle. Neighbouring lanes
-    have similar costs, so the attempts per period of running lanes predict them.
+    An element that needs many attempts and starts last leaves the other positions idle.
+    Neighbouring elements have similar costs, so the attempts per period of those that
+    are running predict them.
     """
     order = np.argsort(work, kind="stable")
     each = used[order] / np.maximum(stops[order], 0.5)

@@ -32,7 +32,7 @@ class Table:
         # rounding may separate the end of the run from its last stop
         real = (place >= 0) & (place < places)
         at = at[real]
-        # one index into all lanes and places is faster than two
+        # one index into all batch elements and places is faster than two
         rows = self.numbers.reshape(lanes * places, width)
         found = np.stack([value[at] for value in values], axis=1)
         rows[lane[real] * places + place[real]] = found

@@ -20,7 +20,7 @@ _PATIENCE = 80
 # part of one of these attempts for which an impact counts that loses energy: bodies
 # come to rest after many of them
 _IMPACT_WEIGHT = 1 / 16
-# impacts on two constraints within this fraction of a natural step accumulate
+# impacts on two constraints within this fraction of the longest allowed step accumulate
 _TOGETHER = 1e-3
 # minimum number of steps per forcing period
 _PARTS = 4
@@ -295,8 +295,8 @@ def _crossed(carried, attempt):
 
 
 def _together(carried):
-    """Return whether two constraints were hit within a negligible fraction of a natural
-    step.
+    """Return whether two constraints were hit within a negligible fraction of the
+    longest allowed step.
     """
     room = _TOGETHER * carried.longest
     recent = [jnp.where(carried.t - t <= room, 1.0, 0.0) for t in carried.struck]

@@ -30,7 +30,7 @@ class Sides(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """What follows a crossing, by its jets."""
+    """The jets after a crossing, and the flags of sliding that follow from them."""
 
     jets: list
     # for each surface, whether the motion slides along it from here
@@ -74,10 +74,11 @@ def past_surfaces(
 ) -> Passed:
     """Return the jets after the crossing of a surface, whose distance is then zero.
 
-    With a hysteresis it is twice that, and after a reset any. If the far side drives
-    the motion back, it slides: the limit of the force that holds it there, over that of
-    the branch, is 1 + s. `approach` is the (negative) rate at which the motion came,
-    and `blur` the rounding errors of the distances.
+    With a hysteresis, the distance is twice the hysteresis; after a reset, it may have
+    any value. If the branch beyond the surface points back, the motion slides; the
+    field then changes by at most 1 + s times the difference of the branches. `approach`
+    is the (negative) rate at which the motion came, and `blur` the rounding errors of
+    the distances.
     """
     jets, m = list(jets), functions.m
     slides, stuck = [], jnp.asarray(False)

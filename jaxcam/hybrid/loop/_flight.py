@@ -1,4 +1,6 @@
-"""Check a step of free flight for events: accept it, shorten it, or land."""
+"""Check a step of free flight for events: accept it, shorten it, or end it at an
+impact.
+"""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +17,7 @@ from ._gap_polynomial import (
 )
 
 
-# a landing is computed by the Taylor series if it lies beyond this fraction of the
+# an impact is computed by the Taylor series if it lies beyond this fraction of the
 # step: the error of the series is of fourth order in the rest
 _CLOSE = 2e-3
 # and if the gap is nearly a straight line there, so that its root is a short series

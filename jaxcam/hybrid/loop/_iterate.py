@@ -1,9 +1,9 @@
 """Define one iteration of the event loop: one attempted step in the current mode.
 
 The loop has no inner loop. A step that crosses a constraint, or may have crossed it, is
-rejected; the batch element (lane) keeps its state, and the next iteration tries a
-better length. All operations are scalar arithmetic and selection, so a batch of lanes,
-each in its own mode, advances together. Step lengths carry no derivative, but event
+rejected; the batch element keeps its state, and the next iteration tries a better
+length. All operations are scalar arithmetic and selection, so the elements of a batch,
+each in its own mode, advance together. Step lengths carry no derivative, but event
 times do.
 """
 

@@ -17,7 +17,7 @@ from ._step import seen_from_inside, Step, StepEnd
 
 
 class Landing(NamedTuple):
-    """The end of a step, with the impact there if it lands."""
+    """The end of a step, with the impact there if it `lands` (ends in an impact)."""
 
     t: Any
     # the time at which functions are evaluated

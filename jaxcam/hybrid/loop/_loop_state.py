@@ -36,7 +36,7 @@ class LoopState(NamedTuple):
     # resolution of each gap
     blur: tuple
     # for each constraint, the largest gap that contact has suppressed: that of the
-    # multiplier over a natural step
+    # multiplier over the longest allowed step
     held: tuple
     # for several constraints: time of the last impact on each, and number of
     # consecutive impacts whose flights are below rounding
@@ -92,7 +92,7 @@ class LoopState(NamedTuple):
     @property
     def behind(self) -> list:
         """For each switching surface, whether a jump of the state has crossed it; or,
-        while the motion slides, whether nothing holds it there any more.
+        while the motion slides, whether the condition for sliding is violated.
         """
         parts = (self.jets, self.sizes, self.blur)
         rest = (part[len(self.held) :] for part in parts)

@@ -6,8 +6,9 @@ from ._flight import StepVerdict
 from ._gap_polynomial import end_curvature, Jet
 
 
-# a release is located by repeating the step until this fraction of a natural step
-# remains, over which the multiplier is a parabola
+# a release is located by repeating the step until the rest is this fraction of the
+# step length that the error estimate alone allows; over it, the multiplier is a
+# parabola
 CLOSE = 1e-7
 
 
@@ -66,8 +67,8 @@ def judge_contact(
 
 
 def opens(jet: Jet, scale, rounding):
-    """Return whether the extrapolated multiplier opens a gap within a natural step. A
-    multiplier that is zero to within rounding does not.
+    """Return whether the extrapolated multiplier opens a gap within the step length
+    `scale` (s). A multiplier that is zero to within rounding does not.
     """
     rise = jnp.maximum(jet.jerk, 0.0)
     pull = jnp.maximum(jet.acceleration, 0.0) + rise * (scale / 3)

@@ -31,7 +31,7 @@ def rest_together(
     negligible.
 
     **Arguments:** the `jets` after the impact, the `mode` then, which constraint was
-    `hit`, the natural length of a step (s), the `fastest` rebound so far, and the
+    `hit`, the longest allowed step (s), the `fastest` rebound so far, and the
     `rounding` of each gap.
     """
     m = functions.m

@@ -1,4 +1,4 @@
-"""What an accepted attempt is called in the log."""
+"""Choose the kind under which the log lists an accepted attempt."""
 
 import jax.numpy as jnp
 

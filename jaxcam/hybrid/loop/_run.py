@@ -16,7 +16,7 @@ from ._iterate import iteration, Record
 from ._loop_state import LoopState
 
 
-# iterations between two checks for running lanes, and between two writes to
+# iterations between two checks for running batch elements, and between two writes to
 # the log, which are costly under vmap
 _BLOCK = 16
 
@@ -45,8 +45,8 @@ def run(
 ) -> tuple[LoopState, Log]:
     """Iterate until the run has finished or the log is full.
 
-    This supports forward mode only. Under `vmap`, all lanes share the iterations, so
-    one row of the log is written for all of them at once.
+    This supports forward mode only. Under `vmap`, all batch elements share the
+    iterations, so one row of the log is written for all of them at once.
     """
     carried, log = run_raw(functions, plan, carried, rows, _row, company)
     return carried, log_of(log, functions.n)
@@ -103,7 +103,8 @@ def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
     """Run a block of attempts of one trajectory, to be mapped over many.
 
     Returns:
-        The lane, and for each number in `row` an array with one entry per attempt.
+        The batch element, and for each number in `row` an array with one entry per
+        attempt.
     """
 
     def body(carried):
@@ -119,13 +120,13 @@ def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
 
 
 def run_many(some: Callable, lanes: LoopState, rows: int, row):
-    """Iterate until no lane is running or the log is full.
+    """Iterate until no batch element is running or the log is full.
 
-    **Arguments:** `some(lanes)`, the `attempts` of all lanes with the lanes last in the
-    log; the lanes, `(lanes,)` each; the rows of the log, and `row`.
+    **Arguments:** `some(lanes)`, the `attempts` of all batch elements, which are last
+    in the log; the elements, `(elements,)` each; the rows of the log, and `row`.
 
     Returns:
-        The lanes and the log, `(rows, lanes)` for each number in a row.
+        The batch elements and the log, `(rows, elements)` for each number in a row.
     """
     # the log is written in its final layout, because under `vmap` each write would move
     # all of it

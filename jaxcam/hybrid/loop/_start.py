@@ -11,7 +11,7 @@ from ._select import any_of
 
 
 def starts_behind(system, t, state):
-    """Return whether a state is behind a constraint, and the gaps, shape `(m,)`."""
+    """Return whether a state penetrates a constraint, and the gaps, shape `(m,)`."""
     return jnp.any(least_gaps(system, t, state) < 0), gaps(system, t, state)
 
 

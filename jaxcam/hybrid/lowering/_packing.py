@@ -35,22 +35,24 @@ class Packing(NamedTuple):
 
 
 class Packed(NamedTuple):
-    """The arrays of a pytree; if lanes differ, `numbers` has a column for each."""
+    """The arrays of a pytree; if batch elements differ, `numbers` has a column for
+    each.
+    """
 
     numbers: np.ndarray
-    """Shape `(k,)` or `(k, lanes)`."""
+    """Shape `(k,)` or `(k, elements)`."""
     apart: list
-    """Leaves that are not 64-bit floats, with a row for each lane."""
+    """Leaves that are not 64-bit floats, with a row for each batch element."""
     packing: Packing
 
     def some(self, lanes) -> tuple:
-        """Return the numbers and other leaves of some lanes."""
+        """Return the numbers and other leaves of some batch elements."""
         return self.numbers[:, lanes], [leaf[lanes] for leaf in self.apart]
 
 
 def pack(tree, lanes: int | None = None) -> Packed:
     """Return the packed arrays of a pytree; with `lanes`, each array has a row per
-    lane.
+    batch element.
     """
     leaves, structure = jax.tree.flatten(tree)
     plain = [leaf.dtype == jnp.float64 for leaf in leaves]

@@ -4,8 +4,8 @@ In the course of an impact, the normal impulse P grows and the state changes in
 proportion. With the slip velocity s and the normal velocity v, this is a
 piecewise-smooth system in two variables with P as its time (Routh's method): the slip
 decreases at a constant rate until it is zero; then it remains zero if friction suffices
-(the condition of Filippov for sliding), otherwise it reverses. The impact ends where
-the hypothesis of restitution says.
+(the condition of Filippov for sliding), otherwise it reverses. The chosen
+hypothesis of restitution (Newton, Poisson or Stronge) determines where the impact ends.
 """
 
 from typing import Any, NamedTuple

@@ -15,7 +15,7 @@ from ._normal import (
 )
 
 
-# Flights shorter than this fraction of a natural step are negligible
+# Flights shorter than this fraction of the longest allowed step are negligible
 SHORT_FLIGHT = 1e-8
 # Normal velocities below this fraction of the fastest rebound are negligible
 SLOW_REBOUND = 1e-13

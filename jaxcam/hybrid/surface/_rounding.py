@@ -47,7 +47,7 @@ def forced_time(period):
 def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
     """Return the gaps of a start plus `room` times their resolution.
 
-    A start is not behind any constraint if none of them is negative.
+    A start penetrates no constraint if none of them is negative.
     """
     rounding = gap_rounding(system, t, x, jnp.abs(x))
     acceleration = normal_acceleration(system, t, x)

@@ -70,7 +70,7 @@ class InMode(OnSides):
 
 
 class SlideTerms(NamedTuple):
-    """What decides about sliding on the K surfaces on which a motion can slide."""
+    """The terms that determine sliding on the K surfaces where it is possible."""
 
     # switching functions on the side of the motion, and their rates there
     heights: Float[Array, " K"]
