@@ -38,14 +38,15 @@ class Lane(NamedTuple):
 
 
 class Axes(eqx.Module):
-    """The parameters that differ between branches (lanes); static."""
+    """The parameters that differ between branches; static."""
 
     tree: PyTree = eqx.field(static=True)
     """0 for each leaf that differs, None for each shared leaf."""
 
     @staticmethod
     def of(one: PyTree, given: PyTree, lanes: int) -> "Axes":
-        """Return the axes, given the parameters of one lane and those of all lanes.
+        """Return the axes, given the parameters of one branch and those of all
+        branches.
 
         Raises:
             ValueError: The number of values is wrong.
@@ -68,7 +69,7 @@ class Axes(eqx.Module):
         return jax.tree.leaves(self.tree, is_leaf=lambda x: x is None)
 
     def of_lane(self, given: PyTree, index: int) -> PyTree:
-        """Return the parameters of one lane."""
+        """Return the parameters of one branch."""
         flat, structure = jax.tree.flatten(given)
         chosen = [
             x[index] if axis == 0 else x
@@ -83,8 +84,8 @@ def follow_lanes(
     """Follow all branches to their ends.
 
     **Arguments:** the problem, and an algorithm that predicts from one point;
-    parameters `given` to the problem, which differ between lanes by `axes`, and the
-    `leaf` that is followed; for each lane a point `z` and the sign of its direction;
+    parameters `given` to the problem, which differ between branches by `axes`, and the
+    `leaf` that is followed; for each branch a point `z` and the sign of its direction;
     bounds; settings from `as_traced`; the maximum number of `points`; and `progress`,
     which is called with the completed fraction, or None.
 

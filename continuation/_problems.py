@@ -154,7 +154,7 @@ class PeriodicPoints(AbstractRepresentation):
 
 @eqx.filter_jit
 def _mapped(problem: FixedPoint, u, tangent):
-    """Return the next point of an orbit and of a deviation from it."""
+    """Return the next point of an orbit and of a perturbation of it."""
     return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
 
 

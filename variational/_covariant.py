@@ -80,8 +80,8 @@ def covariant_vectors(
         settings: Accuracy of the simulation; the default tolerance is 1e-12.
 
     Returns:
-        A `CovariantVectors`. Sticking removes every deviation, so a motion that sticks
-            has no such directions, and all vectors are NaN.
+        A `CovariantVectors`. Sticking removes every perturbation, so a motion that
+            sticks has no such directions, and all vectors are NaN.
 
     Raises:
         ValueError: The system has no period, or a number of periods is invalid.

@@ -1,4 +1,4 @@
-"""Propagate a deviation through an event: an impact, a start of contact, or a
+"""Propagate a perturbation through an event: an impact, a start of contact, or a
 release.
 """
 
@@ -77,8 +77,8 @@ def onto_contact(
     contact.
 
     A state in contact is not changed, but the derivative of the step projects
-    deviations onto those allowed by contact: the rank falls by two for each constraint,
-    while the dependence of the contact state on the parameters remains.
+    perturbations onto those allowed by contact: the rank falls by two for each
+    constraint, while the dependence of the contact state on the parameters remains.
     """
     values = gaps(system, t, x)
     normals = jax.jacfwd(lambda y: gaps(system, t, y))(x)

@@ -21,10 +21,10 @@ def filippov_saltation(
 
         S = I + (F+ - F-) H_x / (H_t + H_x F-).
 
-    At the start of sliding, its rank falls by one, because the deviation is projected
-    onto the surface. At the end of sliding, one field has become tangent, F+ = F-, and
-    S is the identity. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, chapter 7)
+    At the start of sliding, its rank falls by one, because the perturbation is
+    projected onto the surface. At the end of sliding, one field has become tangent, F+
+    = F-, and S is the identity. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations
+    of Non-Smooth Mechanical Systems, 2004, chapter 7)
 
     Args:
         system: The system.

@@ -202,11 +202,11 @@ def _padded(lanes: int) -> int:
 
 
 def _in_turn(some: Callable, batched, states):
-    """Call `some(batched, states)` for one block of lanes after another, and
+    """Call `some(batched, states)` for one block of motions after another, and
     concatenate.
 
     Blocks have equal sizes, so that one program suffices; they are padded with the last
-    lane.
+    motion.
     """
     lanes = states.shape[0]
     count = -(-lanes // _BLOCK)
@@ -236,7 +236,7 @@ class _Seen:
 
     @property
     def share(self) -> float:
-        """Return the fraction of periods completed, over all lanes."""
+        """Return the fraction of periods completed, over all motions."""
         # the first is the start of the run
         done, most = self._filled - 1, self.logs.shape[1] - 1
         return float(np.mean(np.minimum(done, most))) / most
@@ -247,7 +247,7 @@ class _Seen:
         return bool(np.all(self._filled >= self.logs.shape[1]))
 
     def take_turns(self, logs, hits, after) -> None:
-        """Add values at the ends of the next periods, `(lanes, turns, ...)`."""
+        """Add values at the ends of the next periods, `(motions, turns, ...)`."""
         first = int(self._filled[0])
         count = min(logs.shape[1], self.logs.shape[1] - first)
         self.logs[:, first : first + count] = logs[:, :count]
@@ -299,7 +299,7 @@ def _summary(seen: _Seen, status, length, transient, blocks):
 
 
 def _lanes(system, state, where, values):
-    """Split the system into the parts that differ between lanes and the shared
+    """Split the system into the parts that differ between motions and the shared
     parts.
     """
     if where is None:
@@ -320,14 +320,14 @@ def _lanes(system, state, where, values):
     return batched, shared, state
 
 
-# number of lanes in one program, so that their logs fit into the cache and waiting
+# number of motions in one program, so that their logs fit into the cache and waiting
 # times are short
 _BLOCK = 128
 
 
 @eqx.filter_jit
 def _turn(batched, shared, length):
-    """Return the length of a period in each lane, shape `(lanes,)`, or `(1,)` if
+    """Return the length of a period in each motion, shape `(motions,)`, or `(1,)` if
     equal.
     """
 
@@ -342,7 +342,7 @@ def _turn(batched, shared, length):
 
 @eqx.filter_jit
 def _restitutions(batched, shared, t0, states):
-    """Return the coefficients of restitution, (lanes, m)."""
+    """Return the coefficients of restitution, (motions, m)."""
 
     def one(batched, state):
         return restitutions(eqx.combine(batched, shared), t0, state)

@@ -78,7 +78,7 @@ def step_matrix(
     before, now = jnp.stack(row.before), jnp.stack(row.contact)
     held = jnp.stack(point.contact)
     if functions.planar:
-        # contact removes the deviation
+        # contact removes the perturbation
         matrix = jnp.where(held[0], 0.0, matrix)
     else:
         matrix = contact_projector(system, row.t, before, held) @ matrix

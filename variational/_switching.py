@@ -1,4 +1,4 @@
-"""Propagate deviations through the crossing of a switching surface."""
+"""Propagate perturbations through the crossing of a switching surface."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

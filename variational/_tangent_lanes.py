@@ -1,4 +1,4 @@
-"""Propagate frames of tangent vectors along many lanes, chunk by chunk."""
+"""Propagate frames of tangent vectors along many motions, chunk by chunk."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from ._step_matrix import elementwise_product, LogRow, step_matrix, StepStart
 
 
 class Carried(NamedTuple):
-    """The state that a lane carries from one chunk of rows to the next."""
+    """The state that a motion carries from one chunk of rows to the next."""
 
     lane: Any
     point: StepStart
@@ -39,7 +39,7 @@ def _plan(system, length, t0, turns, settings) -> Plan:
 
 @eqx.filter_jit
 def first_frames(batched, shared, length, states, t0, turns, settings):
-    """Return the initial frame of each lane."""
+    """Return the initial frame of each motion."""
 
     def one(batched, state):
         system = eqx.combine(batched, shared).prepared()

@@ -42,7 +42,7 @@ def first_turn(states: Float[Array, "lanes n"]) -> TurnFrame:
 @eqx.filter_jit
 def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnFrame):
     """Run the next `TURNS` periods; return the carried state, and its values at the end
-    of each period, `(lanes, TURNS, ...)`.
+    of each period, `(motions, TURNS, ...)`.
 
     **Arguments:** `max_steps` limits the attempted steps in a period.
     """

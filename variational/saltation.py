@@ -1,4 +1,4 @@
-"""Propagate deviations through events: impacts, starts of contact and releases."""
+"""Propagate perturbations through events: impacts, starts of contact and releases."""
 
 import equinox as eqx
 import jax
@@ -22,7 +22,7 @@ from ._event_law import (
 def saltation_matrix(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Return the saltation matrix, which maps a deviation across an impact.
+    """Return the saltation matrix, which maps a perturbation across an impact.
 
     With F- and F+ the vector field before and after, R the impact law and H the gap,
 
@@ -118,14 +118,15 @@ def saltation_parts(
 def saltation_into_contact(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Map a deviation before an impact to a deviation in the contact that follows.
+    """Map a perturbation before an impact to a perturbation in the contact that
+    follows.
 
     This is for an impact after which contact begins immediately: a plastic impact, or
     one in a chatter sequence whose remaining impacts are completed analytically. The
     normal velocity after it is zero, and the field is that of contact (thesis, eq.
     2.30). The rank falls by two, because gap and normal velocity are then zero
-    regardless of their previous values; in a system with two states, all deviations are
-    removed, and the motion has no memory of its past.
+    regardless of their previous values; in a system with two states, all perturbations
+    are removed, and the motion has no memory of its past.
 
     Args:
         system: The system.
@@ -156,11 +157,11 @@ def saltation_into_contact(
 def saltation_at_release(
     system: HybridSystem, t, state: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Map a deviation in contact to a deviation in the flight after release.
+    """Map a perturbation in contact to a perturbation in the flight after release.
 
-    At release, the contact field and the free field are equal, so the deviation is
-    unchanged. The matrix is the identity for deviations allowed by contact, and zero in
-    the directions that contact has removed.
+    At release, the contact field and the free field are equal, so the perturbation is
+    unchanged. The matrix is the identity for perturbations allowed by contact, and zero
+    in the directions that contact has removed.
 
     Args:
         system: The system.
@@ -224,8 +225,8 @@ def saltation_second(
 ) -> Float[Array, "n n n"]:
     """Return the second derivative of the flow across an impact, for normal forms.
 
-    A deviation d becomes S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is returned. It
-    is computed by nested forward differentiation of [`variational.event_map`][], and
+    A perturbation d becomes S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is returned.
+    It is computed by nested forward differentiation of [`variational.event_map`][], and
     grows like the inverse cube of the impact speed.
 
     Args:

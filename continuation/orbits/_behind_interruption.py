@@ -4,8 +4,8 @@ After the impacts near release, the deviation of such an orbit from the sticking
 is described by one number x > 0. The parameter at which the orbit is periodic is a
 continuous function of x, with the interruption at x = 0. These orbits therefore form
 one branch that begins at the interruption; towards it, the number of impacts grows by
-one at each grazing. The branch is started at a small distance from the interruption and
-followed away from it.
+one at each grazing bifurcation. The branch is started at a small distance from the
+interruption and followed away from it.
 """
 
 from typing import Any

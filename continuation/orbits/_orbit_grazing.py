@@ -1,4 +1,4 @@
-"""Continue an orbit past a grazing, with one impact fewer or more."""
+"""Continue an orbit past a grazing bifurcation, with one impact fewer or more."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ def _lowest(problem, u, parameters):
 
 
 def orbit_grazing(problem: Any, point: Any) -> Start | None:
-    """Return the orbit at a grazing, with the impact of zero speed removed or inserted.
+    """Return the orbit at grazing, with the impact of zero speed removed or inserted.
 
     `problem` is an `ImpactingOrbits`, and so is the problem of the start.
 

@@ -186,7 +186,7 @@ def _settled(system, base, number: int, free: bool, t0):
 
 
 def _somewhere(system, t0):
-    """Return a state outside the constraints: the release point if it exists."""
+    """Return a state without penetration: the release point if it exists."""
     names = system.state_names
     n = len(names) or _dimension(system)
     try:
@@ -204,7 +204,7 @@ def _somewhere(system, t0):
         slope = jax.grad(lambda x, w=which: gaps(system, time, x)[w])
         normal = slope(state)
         state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
-    raise ValueError("no state outside the constraints was found; give a guess")
+    raise ValueError("no state with gap >= 0 was found; give a guess")
 
 
 def _dimension(system) -> int:

@@ -96,7 +96,7 @@ class StickingOrbits(AbstractProblem):
         return jnp.concatenate(rows)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "2 2"]:
-        """Return zeros, because sticking removes every deviation.
+        """Return zeros, because sticking removes every perturbation.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

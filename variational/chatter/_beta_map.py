@@ -1,4 +1,6 @@
-"""Compute the deviation left by an interrupted chatter sequence, beta(lambda)."""
+"""Compute beta(lambda), the deviation from the sticking orbit after interrupted
+chatter.
+"""
 
 import equinox as eqx
 import jax
@@ -16,7 +18,7 @@ _IMPACTS = 4000
 
 
 class BetaMap(eqx.Module):
-    """The deviation left by a chatter sequence after its last impact.
+    """The deviation from the sticking orbit after the last impact of chatter.
 
     An impact at time tau < 0 relative to release, with rebound speed v, has the
     coordinate lambda = v / (c tau^2), where c is the rate of the relative acceleration
@@ -27,6 +29,8 @@ class BetaMap(eqx.Module):
 
         velocity = c (tau_P^2 / 2 + beta tau*^2),
         gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
+
+    After complete chatter, the motion leaves from contact and beta = gamma = 0.
     """
 
     beta: Float[Array, "..."]
@@ -64,7 +68,8 @@ def beta_parts(lam, r) -> BetaMap:
 
 
 def beta_map(lam, r) -> Float[Array, "..."]:
-    """Return beta(lambda): the deviation left by an interrupted chatter sequence.
+    """Return beta(lambda): the deviation from the sticking orbit after interrupted
+    chatter.
 
     Args:
         lam: Coordinate lambda of the first impact, dimensionless, >= 0, any shape.
@@ -100,7 +105,7 @@ def _one(lam, r, bar):
     safe = jnp.where(after, lam, 0.35)
     end = jnp.where(after, lambda_map(safe, r), lam)
     scale = scale * jnp.where(after, hop_ratio(safe), 1.0)
-    # a flight that lands exactly at release has lambda = inf and scale = 0
+    # a flight that ends exactly at release has lambda = inf and scale = 0
     speed = jnp.where(jnp.isinf(end), 0.0, scale * scale * end)
     beta = speed - scale * scale / 2
     gamma = scale * (scale * scale / 3 - speed)

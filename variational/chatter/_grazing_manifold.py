@@ -119,9 +119,9 @@ def chattering_region(
     """Return the upper boundary of the region D in which chatter is complete.
 
     The boundary C consists of impacts whose sequence accumulates exactly at release.
-    Close to release, it is the parabola with lambda_bar; from there, it is extended
-    backwards by the inverse of the impact map, under which it is invariant (thesis,
-    eqs. 6.20 and 6.91).
+    Close to release, it is the parabola v = lambda_bar c tau^2, with the time tau from
+    release and the jerk c at release. It is invariant under the impact map, whose
+    inverse extends it backwards in time (thesis, eqs. 6.20 and 6.91).
 
     Args:
         system: A system with two states, one constraint, a period and a positive

@@ -2,7 +2,7 @@
 
 This is separate from the event loop of `jaxcam.hybrid`, because it computes gaps with
 high relative accuracy and can be differentiated twice. A step is the same program
-whether it searches for the next impact, lands on it or finds the lowest point of a
+whether it searches for the next impact, ends at it or finds the lowest point of a
 flight, so a loop over steps compiles quickly. Its forward derivative is that of the
 motion with fixed step lengths, corrected at the impact.
 """

@@ -70,7 +70,7 @@ def interruption_margin(
 
 @jax.custom_jvp
 def _last(slope):
-    """Return the slope, which has no derivative: landings are correct to first
+    """Return the slope, which has no derivative: impacts are correct to first
     order.
     """
     return slope

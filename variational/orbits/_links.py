@@ -20,7 +20,7 @@ from ._flight import flight_nodes
 from ._shooting import Shooting
 
 
-# Newton iterations for a landing time that is known to a part in a hundred
+# Newton iterations for an impact time that is known to a part in a hundred
 _EVALUATIONS = 5
 
 
