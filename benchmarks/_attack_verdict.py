@@ -215,7 +215,7 @@ def _differ(known: Known, run: Run, end: float) -> Mismatch | None:
 
 
 def _grazes(known: Known, run: Run, mismatch: Mismatch) -> bool:
-    """Whether an impact found in only one run is a graze to within the tolerance."""
+    """Whether an impact found in only one run is grazing to within the tolerance."""
     room = known.room(min(mismatch.time, known.end))
     hits = [i for i in known.truth.impacts if abs(i.time - mismatch.time) <= 1e-6]
     speeds, pulls = ([i[k] for i in hits] for k in (2, 3))

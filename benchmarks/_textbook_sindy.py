@@ -1,4 +1,4 @@
-"""The rival: sparse regression on derivatives by pysindy (SINDy with control).
+"""The baseline: sparse regression on derivatives by pysindy (SINDy with control).
 
 The acceleration of the position is regressed on position, velocity and input. Its
 settings are chosen on the last recording: those whose free run of it is best, in a fit

@@ -9,8 +9,9 @@
 # # A4. How well does a model predict another recording? Free runs
 #
 # A model is fitted to one whole recording and then simulates another one in a free run,
-# which uses only the first 20 samples and the measured input. Each line of the result
-# adds a term that the diagnosis in notebook A3 named. The textbook models are in
+# which uses only the first 20 samples and the measured input. The first line of each
+# result is for the textbook model; each further line adds a term that the diagnosis in
+# notebook A3 named. The textbook models are in
 # `textbook_models.py`.
 #
 # The recordings are public; A3 lists their sources. Put the folders `pendulum`,
@@ -108,7 +109,7 @@ estimation, pulses = read_stage(folder)
 steps = {
     "textbook": (),
     "dry friction": ("coulomb_friction",),
-    "additional damping backwards": ("damping_backwards",),
+    "additional damping in backward motion": ("damping_backwards",),
     "friction that depends on position": ("uneven_friction",),
 }
 names: tuple[str, ...] = ()
@@ -131,9 +132,9 @@ rate = np.gradient(estimation["position_m"], estimation.time)
 extra = pulses["motor_force_N"] - estimation["motor_force_N"]
 for name, there in {"forwards": rate > 0.02, "backwards": rate < -0.02}.items():
     usual = np.mean(np.abs(estimation["motor_force_N"][there]))
-    print(f"{name}: {np.mean(extra[there]):+.2f} N in addition to {usual:.1f} N")
+    print(f"{name}: {usual:.1f} N, in the second {np.mean(extra[there]):+.2f} N more")
 early = (pulses.time > 0.1) & (pulses.time < 0.3)
-print(f"before the first pulse: {np.mean(extra[early]):+.2f} N")
+print(f"before the first pulse: {np.mean(extra[early]):+.2f} N more")
 # -
 
 # ## A mounting head

@@ -67,7 +67,7 @@ ball = jnp.array([9.81, 0.8])
 forward = jax.jit(jax.jacfwd(outcome))(ball)
 exact = jax.jacfwd(by_formula)(ball)
 print("d height / d (gravity, restitution):", forward[0], "formula:", exact[0])
-print("d time of rest / d (gravity, restitution):", forward[1], "formula:", exact[1])
+print("d start of rest / d (gravity, restitution):", forward[1], "formula:", exact[1])
 assert jnp.allclose(forward, exact, rtol=1e-9)
 # -
 

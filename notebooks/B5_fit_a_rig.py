@@ -8,12 +8,12 @@
 
 # # B5. Fit the parameters of a rig
 #
-# The package contains three recordings, each of four seconds, of a cam-follower rig
-# with noisy encoders at three speeds. We fit the parameters of the spring, the cam and
-# the restitution, find the parameters that the recordings cannot determine, and see how
-# reliable the standard errors are if the model lacks an effect. (The recordings were
-# simulated by code that is independent of the fit, so the true values are known. The
-# simulated rig has friction in its hinge.)
+# The package contains three simulated recordings, each of four seconds, of a
+# cam-follower rig with noisy encoders at three speeds. The program that simulated them
+# shares no code with the fit, and the simulated rig has friction in its hinge. We fit
+# the parameters of the spring, the cam and the restitution, find the parameters that
+# the recordings cannot determine, and compare the results with the true values to see
+# how reliable the standard errors are if the model lacks an effect.
 
 # +
 import jax.numpy as jnp
@@ -138,7 +138,8 @@ assert abs(off) < 4
 # -
 
 # If you do not know which term to add, use `jaxcam diagnose`. It tests a library of
-# terms, and reports `none` if no term is needed and `unknown` if none is sufficient.
+# terms, and reports `none` if it detects no missing physics and `unknown` if no term
+# is sufficient.
 
 # ## A profile likelihood
 #
@@ -156,6 +157,6 @@ with style():
     ax.plot(curve.values, curve.cost, "o", label="profile")
     ax.axvline(real.damping, color="black", lw=0.8, label="truth")
     ax.axhline(3.84, color="black", lw=0.8, ls=":", label="95 %")
-    ax.set(xlabel="damping of the hinge (1/s)", ylabel="cost above the best fit (-)")
+    ax.set(xlabel="damping of the hinge (1/s)", ylabel="cost above the best fit (–)")
     ax.legend()
 plt.show()

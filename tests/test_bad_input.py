@@ -57,7 +57,7 @@ def test_state_that_is_not_finite(value, place):
 def test_state_behind_the_constraint(system, state):
     text = refusal(system, state)
     assert "gap is negative" in text
-    assert "start outside the constraint, or pass state=None" in text
+    assert "start with every gap at zero or above, or pass state=None" in text
 
 
 @pytest.mark.parametrize("state", [[1.0], [1.0, 0.0, 0.0]])

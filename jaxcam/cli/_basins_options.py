@@ -48,7 +48,7 @@ class Cells:
     ] = 1
 
     def check(self, system: str) -> None:
-        """
+        """Check the values of the options.
 
         Raises:
             ValueError: An option is invalid; the message names it.

@@ -6,7 +6,7 @@ from ._files_options import Files
 
 
 def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
-    """Read the runs of a folder or of one file, and the rig file.
+    """Read the recordings of a folder or of one file, and the rig file.
 
     **Arguments:** `system` is `FILE.py:CLASS` and replaces the system of the rig file.
 
@@ -49,7 +49,7 @@ def _runs(case: Path, channels, files: Files, layout):
 
 
 def notes_of(runs) -> tuple[str, ...]:
-    """Return the repairs made while the runs were read, each note once."""
+    """Return the repairs made while the recordings were read, each note once."""
     return tuple(dict.fromkeys(n for run in runs for n in run.meta.get("notes", ())))
 
 

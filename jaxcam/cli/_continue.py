@@ -106,7 +106,7 @@ def continue_(
 
 
 def _refuse_interrupted(path: Path) -> None:
-    """
+    """Reject a folder with an interrupted branch.
 
     Raises:
         ValueError: The folder contains an interrupted branch.

@@ -103,7 +103,7 @@ class Following:
     ] = 300
 
     def check(self) -> None:
-        """
+        """Check the values of the options.
 
         Raises:
             ValueError: An option is invalid; the message names it.

@@ -34,8 +34,8 @@ class DemoResult:
 
 
 def compared(runs, nominal: Rig, folder: Path, report) -> DemoResult:
-    """Segment the runs, simulate their flights and the complete model, and draw the
-    results.
+    """Segment the recordings, simulate their flights and the complete model, and draw
+    the results.
     """
     segments = segment_case(
         tuple(runs),

@@ -52,7 +52,7 @@ def _title(found: Diagnosis) -> str:
     if found.verdict == Verdict.EFFECT:
         return listed(found.names)
     if found.verdict == Verdict.NONE:
-        return "nothing is missing"
+        return "no missing physics detected"
     named = [effect.name for effect in found.effects if effect.term]
     return listed([*named, "unknown physics"])
 

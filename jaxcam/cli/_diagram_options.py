@@ -59,7 +59,7 @@ class Sweep:
     ] = "stroboscope"
 
     def check(self) -> None:
-        """
+        """Check the values of the options.
 
         Raises:
             ValueError: An option is invalid; the message names it.
@@ -128,7 +128,7 @@ class Starts:
     ] = 0
 
     def check(self, sweep: Sweep) -> None:
-        """
+        """Check the values of the options.
 
         Raises:
             ValueError: An option is invalid; the message names it.

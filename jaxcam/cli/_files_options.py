@@ -36,7 +36,7 @@ class Files:
     ] = None
 
     def check(self) -> None:
-        """
+        """Check the values of the options.
 
         Raises:
             ValueError: An option is invalid; the message names it.

@@ -87,7 +87,7 @@ class Result:
 def fitted(
     runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
 ) -> Result:
-    """Segment the runs and fit the parameters of the rig.
+    """Segment the recordings and fit the parameters of the rig.
 
     **Arguments:** `bootstrap`: number of Bayesian bootstrap replicates; 0 omits them.
 

@@ -101,7 +101,7 @@ def page(report: Report) -> str:
             HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
         ),
         '<p class="note">The simulation uses the parameters of the rig file and the '
-        "mean speed of the run, and starts twenty cycles earlier. Angles are cam "
+        "mean speed of the recording, and starts twenty cycles earlier. Angles are cam "
         "angles; ± is the standard deviation over the contacts. If simulation and "
         "recording differ completely, the rig may be on another attractor that "
         "coexists at the same speed.</p>",

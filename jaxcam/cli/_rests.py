@@ -37,7 +37,7 @@ class Intervals(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Rests:
-    """Recorded and simulated contact intervals of one run."""
+    """Recorded and simulated contact intervals of one recording."""
 
     name: str
     rpm: float
@@ -62,9 +62,9 @@ class Rests:
 
 
 def simulate_run(rig: Rig, run: Segments) -> Trajectory:
-    """Simulate the nominal model at the mean speed of a run, until the run's end.
+    """Simulate the nominal model at the mean speed of a recording, until its end.
 
-    It starts at a release point, twenty cam turns before the run.
+    It starts at a release point, twenty cam turns before the recording.
     """
     assert run.drive is not None
     system = rig.system(run.drive.speed, run.drive.phase)
@@ -73,14 +73,14 @@ def simulate_run(rig: Rig, run: Segments) -> Trajectory:
 
 
 def rests(run: Segments, motion: Trajectory) -> Rests:
-    """Return the contact intervals of a run and of its simulation."""
+    """Return the contact intervals of a recording and of its simulation."""
     assert run.drive is not None
     name, rpm = run.recording.name, float(rad_s_to_rpm(run.drive.speed))
     return Rests(name, rpm, _recorded(run), _simulated(run, motion))
 
 
 def rest_table(found: list[Rests]) -> Table:
-    """Return a table with one row for each run and kind, for the terminal."""
+    """Return a table with one row for each recording and kind, for the terminal."""
     table = Table(title="Contact intervals of the follower")
     table.add_column("run", no_wrap=True)
     table.add_column("")
@@ -96,7 +96,7 @@ HEADINGS = ("run", "", "per cycle", "from (rad)", "to (rad)", "fraction of time"
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:
-    """Return the cells of the two rows of a run, under `HEADINGS`."""
+    """Return the cells of the two rows of a recording, under `HEADINGS`."""
     rows = []
     for which, part in one.parts:
         name = one.name if which == "recorded" else ""

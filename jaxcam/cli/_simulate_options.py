@@ -54,7 +54,7 @@ class RunOptions:
     ] = None
 
     def check(self) -> None:
-        """
+        """Check the values of the options.
 
         Raises:
             ValueError: An option is invalid; the message names it.

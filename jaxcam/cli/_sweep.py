@@ -32,7 +32,7 @@ class Execution:
             )
 
     def check_system(self, system: HybridSystem) -> None:
-        """
+        """Reject a system that worker processes cannot import.
 
         Raises:
             ValueError: Other processes could not import the system.

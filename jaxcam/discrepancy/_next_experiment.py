@@ -73,7 +73,7 @@ def compare_experiments(
         asked: Names of the parameters to be determined. The default is the strengths of
             the named terms and the bands of unnamed functions; terms whose BIC is not
             much worse stay free, so that the best recording also distinguishes them. If
-            nothing is missing, the default is all terms, one at a time.
+            the verdict is `none`, the default is all terms, one at a time.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:

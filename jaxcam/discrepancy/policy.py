@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 
 class Group(enum.StrEnum):
-    """What a setting of a policy affects."""
+    """The part of a diagnosis that a setting of a policy affects."""
 
     VERDICT = "verdict"
     BUDGET = "budget"

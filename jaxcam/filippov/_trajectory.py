@@ -12,25 +12,27 @@ from ._system import FilippovSystem
 
 
 class Switches(eqx.Module):
-    """The events of a motion, in order: crossings, and the start and end of sliding."""
+    """The switches of a trajectory, in order: crossings, and the start and end of
+    sliding.
+    """
 
     time: Float[Array, " k"]
-    """Time of each event (s), shape `(k,)`."""
+    """Time of each switch (s), shape `(k,)`."""
     state: Float[Array, "k n"]
-    """State at each event, shape `(k, n)`."""
+    """State at each switch, shape `(k, n)`."""
     before: Int[Array, " k"]
-    """Mode before each event: 1 above, 0 sliding, -1 below; shape `(k,)`."""
+    """Mode before each switch: 1 above, 0 sliding, -1 below; shape `(k,)`."""
     after: Int[Array, " k"]
-    """Mode after each event, shape `(k,)`."""
+    """Mode after each switch, shape `(k,)`."""
 
     @property
     def count(self) -> int:
-        """Number of events."""
+        """Number of switches."""
         return self.time.shape[0]
 
 
 class FilippovTrajectory(eqx.Module):
-    """A motion of a Filippov system on [t0, t1].
+    """A trajectory of a Filippov system on [t0, t1].
 
     Examples:
         >>> from jaxcam.filippov import simulate_filippov
@@ -53,13 +55,13 @@ class FilippovTrajectory(eqx.Module):
     mode: Int[Array, " s"]
     """Mode after each of these times: 1 above, 0 sliding, -1 below; shape `(s,)`."""
     switches: Switches
-    """The events, in order."""
+    """The switches, in order."""
     result: str = eqx.field(static=True)
     """The reason why t1 was not reached; empty if it was."""
 
     @property
     def final(self) -> Float[Array, " n"]:
-        """State at the end of the run."""
+        """State at the end of the trajectory."""
         return self.state[-1]
 
     def at(self, times: VectorLike) -> Float[Array, "times n"]:
@@ -73,7 +75,7 @@ class FilippovTrajectory(eqx.Module):
             States, shape `(times, n)`.
 
         Raises:
-            ValueError: A time is outside the run.
+            ValueError: A time is outside the trajectory.
         """
         wanted = np.asarray(times, dtype=float)
         known = np.asarray(self.time)

@@ -60,7 +60,7 @@ class ForcedOscillator(eqx.Module):
         )
 
     def propagator(self, duration) -> Float[Array, "2 2"]:
-        """Return the matrix that maps a deviation from the periodic motion over
+        """Return the matrix that maps a perturbation of the periodic motion over
         `duration`.
         """
         matrix = jnp.array([[0.0, 1.0], [0.0, 0.0]])

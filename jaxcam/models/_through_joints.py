@@ -21,7 +21,7 @@ _TURN = 2 * np.pi
 _NEAR = 4e-12
 """Tolerance of gap and velocity in contact, relative to the size of the state."""
 _BEHIND = 2e-4
-"""Distance behind the surface at which a body that moves inwards is placed."""
+"""Penetration depth at which a body that moves into the surface is placed."""
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 
@@ -50,7 +50,7 @@ def simulate_through_joints(
     The run stops at every joint and continues with the next piece, so that each part is
     smooth. At a joint where the slope of the lift jumps up, a follower in contact has
     an impact; where it jumps down, the follower leaves the cam. The times of the joints
-    do not depend on the state, so a joint leaves a deviation unchanged, and only
+    do not depend on the state, so a joint leaves a perturbation unchanged, and only
     impacts have saltation matrices.
 
     Args:

@@ -1,4 +1,4 @@
-"""Recordings (the sensor data of one run) and cases (folders of runs)."""
+"""Recordings (sensor data) and cases (folders of recordings)."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -100,15 +100,15 @@ class Case:
         return len(self.recordings)
 
     def __getitem__(self, index: int | str) -> Recording:
-        """Return a run by its index or by the beginning of its name (`"run4"`)."""
+        """Return a recording by its index, or by the start of its name (`"run4"`)."""
         if isinstance(index, int):
             return self.recordings[index]
         found = [run for run in self.recordings if run.name.startswith(index)]
         if len(found) != 1:
             names = _listed(run.name for run in self.recordings)
             raise RecordingError(
-                f"{self.name}: {len(found)} names begin with `{index}`; the runs are "
-                f"{names}."
+                f"{self.name}: {len(found)} names begin with `{index}`; the "
+                f"recordings are {names}."
             )
         return found[0]
 

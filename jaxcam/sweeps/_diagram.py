@@ -117,6 +117,6 @@ def diagram(
     made = Diagram(store.dataset())
     if np.all(made.dataset["code"].values == BEHIND):
         raise ValueError(
-            "all states violate gap >= 0; choose states in front of the constraint"
+            "all states violate gap >= 0; choose states with every gap at zero or above"
         )
     return made

@@ -184,7 +184,7 @@ def one_after_the_other(
         values, starts, first, turns, keep, strict=True
     ):
         state = start if anew or carried is None else carried
-        # a failed lane is restarted
+        # a failed motion is restarted
         state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
         lanes = np.full(len(state), value)
         state = section.lifted(state, where, lanes)

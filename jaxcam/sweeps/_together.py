@@ -40,8 +40,8 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
     impacts, turns = np.concatenate(impacts), np.concatenate(turns)
     if np.all(turns == OUTSIDE):
         raise ValueError(
-            "all states of the grid violate gap >= 0; choose low and high in front of "
-            "the constraint"
+            "all states of the grid violate gap >= 0; choose low and high such that it "
+            "contains states with every gap at zero or above"
         )
 
     def cells():

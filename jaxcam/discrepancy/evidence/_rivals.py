@@ -1,4 +1,4 @@
-"""Other functions in place of those found, compared by a bootstrap of the records."""
+"""Other functions in place of those found, compared by a block bootstrap."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -69,7 +69,7 @@ def _parts(one: Missing) -> frozenset[str]:
 
 
 def _costs(found: Fit, policy: Policy) -> Float[np.ndarray, " b"]:
-    """Return the cost of the samples of each stretch of each record."""
+    """Return the cost of the samples of each section of each recording."""
     longest = max(part.recording.time[-1] for part in found.problem.segments)
     edges = np.linspace(0.0, longest, policy.stretches + 1)[1:-1]
     rows = {name: k for k, name in enumerate(found.problem.records)}

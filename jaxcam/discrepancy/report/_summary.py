@@ -102,8 +102,8 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
         break
     if fitted > policy.as_noise:
         return (
-            "No physics common to the recordings is missing. However, they are not "
-            "explained down to the sensor noise: the residual is "
+            "No missing physics common to the recordings was detected. However, they "
+            "are not explained down to the sensor noise: the residual is "
             f"{ratio(fitted)} times the noise and differs from recording to "
             f"recording.{tail}"
         )
@@ -114,8 +114,8 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
             f"{ratio(unseen)} times the noise."
         )
     return (
-        "Nothing is missing: with its parameters fitted within their tolerances, the "
-        f"model explains all recordings down to the sensor noise.{tail}"
+        "No missing physics was detected: with its parameters fitted within their "
+        f"tolerances, the model explains all recordings down to the sensor noise.{tail}"
     )
 
 

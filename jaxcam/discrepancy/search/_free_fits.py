@@ -293,7 +293,7 @@ def heated(problem: Problem, heat: float) -> Problem:
 
 def unscaled(blocks, names, heat: float):
     """Return information and score with some parameters in their own units, divided by
-    the heat.
+    the cost per sample (`heat`).
     """
     information, score = (x / heat for x in blocks.total())
     unit = np.ones(len(blocks.names))

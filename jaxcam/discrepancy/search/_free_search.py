@@ -174,7 +174,7 @@ class FreeSearch:
         return found
 
     def _shows_apart(self, lead: Lead) -> bool:
-        """Return whether disconnected pieces show the effect of a lead."""
+        """Return whether disconnected pieces show the effect of a candidate."""
         if lead.promise is not None:
             return True
         if lead.family is not None:
@@ -186,7 +186,7 @@ class FreeSearch:
         return next(term for term in self.terms if term.name == name)
 
     def _done(self, best: Missing, lead: Lead, first: Lead) -> bool:
-        """Return whether the data are explained so well that a lead need not be
+        """Return whether the data are explained so well that a candidate need not be
         tried.
         """
         close = lead.gain > self.policy.rivalling * first.gain

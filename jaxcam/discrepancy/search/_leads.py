@@ -149,7 +149,7 @@ class Leads:
     def _elsewhere(
         self, problem: Problem, found: Missing, apart: bool
     ) -> Iterator[Lead]:
-        """Return the leads for functions of the surface, of sensors and of impacts."""
+        """Return the candidates among functions of surface, sensors and impacts."""
         free, heat = self.fits.free(found), heat_of(found.fit)
         # impacts contain no information if they do not connect the pieces
         places = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}

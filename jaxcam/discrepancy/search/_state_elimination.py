@@ -1,4 +1,4 @@
-"""Eliminate the states of a record, piece by piece, from a quadratic likelihood."""
+"""Eliminate the states of a recording, piece by piece, from a quadratic likelihood."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,7 +12,7 @@ TINY = 1e-300
 
 
 class StateElimination:
-    """The states of one record, eliminated from its first piece to its last.
+    """The states of one recording, eliminated from its first piece to its last.
 
     The blocks of a piece are the information of its state with itself and with the
     parameters, its score, and its information with the forces. Rows that connect two

@@ -23,7 +23,7 @@ def _field(default: float = 0.0):
 
 
 class HiddenElement(eqx.Module):
-    """A internal state and the force that it exerts, per unit of mass.
+    """An internal state and the force that it exerts, per unit of mass.
 
     In addition, the force has a `constant` part, a part proportional to the deflection
     of the coordinate from `middle` (`stiffness`), and a part proportional to its

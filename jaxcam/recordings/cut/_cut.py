@@ -248,7 +248,7 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
 def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
     """Return the release, unless the follower may still be bouncing then.
 
-    The rebounds of a low flight that lands on a receding surface are too low to be
+    The rebounds of a low flight that ends on a receding surface are too low to be
     observed. The next flight begins at `latest` (s) in any case.
     """
     if landing is None or landing.kind != "landing":
@@ -317,7 +317,7 @@ def _contact(motion, span, boundaries, flights, restitution) -> Contact:
 
 
 def settling_time(flight: Flight, restitution: float) -> float:
-    """Return the latest time at which the impacts after a landing have died out.
+    """Return the latest time at which the impacts after a flight have died out.
 
     The durations of the flights form a geometric series with the coefficient of
     restitution as its ratio.

@@ -28,7 +28,7 @@ def find_gaps(
     if gaps not in ("refuse", "split"):
         raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')
     if len(time) < 2:
-        raise RecordingError(f"{name}: one sample is not a recording; remove this run.")
+        raise RecordingError(f"{name}: one sample is not a recording; remove it.")
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if len(back):

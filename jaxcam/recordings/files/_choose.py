@@ -101,7 +101,7 @@ def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> N
     if missing:
         raise RecordingError(
             f"{file}: the column `{missing[0]}` is missing; the file has "
-            f"{listed(found)}: assign it with --columns or in [columns] of the rig "
+            f"{listed(found)}; assign it with --columns or in [columns] of the rig "
             f"file (columns=... in Python)."
         )
 

@@ -66,7 +66,7 @@ def mend(recording: Recording, *, bridge: int = _BRIDGE) -> Mended:
     if not pieces:
         raise RecordingError(
             f"{recording.name}: no piece between gaps has {2 * bridge} samples; "
-            "record the run again."
+            "repeat the recording."
         )
     return Mended(tuple(pieces), tuple(notes))
 

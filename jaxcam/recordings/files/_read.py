@@ -228,8 +228,8 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
             pieces.append(piece)
     if not pieces:
         raise RecordingError(
-            f"{label}: the cam turns by less than half a turn; record the run for "
-            f"longer, or check `cam_angle_rad`."
+            f"{label}: the cam turns by less than half a turn; record for longer, "
+            f"or check `cam_angle_rad`."
         )
     return [
         dataclasses.replace(p, meta={**p.meta, "notes": tuple(notes)}) for p in pieces

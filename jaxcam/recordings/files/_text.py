@@ -63,7 +63,7 @@ def kept_lines(file: Path, every: list[str], whole: bool = True) -> Lines:
         lines.append(line)
         gap = False
     if not lines:
-        raise RecordingError(f"{file}: the file is empty; record the run again.")
+        raise RecordingError(f"{file}: the file is empty; repeat the recording.")
     return Lines(_unquoted(lines), whole, notes)
 
 

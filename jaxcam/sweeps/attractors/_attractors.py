@@ -21,7 +21,7 @@ class Attractors(NamedTuple):
     fingerprint: np.ndarray
     """Fingerprints, shape (attractors, means); see `fingerprints`."""
     lane: np.ndarray
-    """Representative lane of each attractor, shape (attractors,)."""
+    """Representative motion of each attractor, shape (attractors,)."""
 
     def __len__(self) -> int:
         return len(self.turns)
@@ -30,21 +30,21 @@ class Attractors(NamedTuple):
 def find_attractors(
     impacts, turns, fingerprint, cells, starts, same: float
 ) -> tuple[np.ndarray, Attractors]:
-    """Find the attractors, and the attractor of each motion (lane).
+    """Find the attractors, and the attractor of each motion.
 
     Args:
-        impacts: Number of impacts in each label, shape `(lanes,)`.
-        turns: Number of periods in each label, shape `(lanes,)`.
-        fingerprint: Shape `(lanes, means)`.
-        cells: An iterable of pairs: indices of non-periodic lanes, and the cells
-            `(lanes, keep)` that they visit.
-        starts: Initial states, `(lanes, n)`; of several lanes on an attractor, the one
-            with the smallest initial state represents it.
+        impacts: Number of impacts in each label, shape `(motions,)`.
+        turns: Number of periods in each label, shape `(motions,)`.
+        fingerprint: Shape `(motions, means)`.
+        cells: An iterable of pairs: indices of non-periodic motions, and the cells
+            `(motions, keep)` that they visit.
+        starts: Initial states, `(motions, n)`; of several motions on an attractor, the
+            one with the smallest initial state represents it.
         same: Two orbits are equal if their fingerprints differ by less than this.
 
     Returns:
-        The attractor numbers `(lanes,)`, with -1 for motions that escaped, -2 for those
-            that failed and -3 for those that could not start; and the attractors.
+        The attractor numbers `(motions,)`, with -1 for motions that escaped, -2 for
+            those that failed and -3 for those that could not start; and the attractors.
     """
     lanes = len(turns)
     group = np.full(lanes, -1)

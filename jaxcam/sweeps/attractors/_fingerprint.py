@@ -26,13 +26,13 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
     other.
 
     Args:
-        states: States, shape `(lanes, keep, n)`; the last `turns` states are one orbit,
-            or all of them if `turns` is 0.
+        states: States, shape `(motions, keep, n)`; the last `turns` states are one
+            orbit, or all of them if `turns` is 0.
         origin: Origin, shape `(n,)`; `(states - origin) / scale` is of order one.
         scale: Scale of the states, shape `(n,)`.
 
     Returns:
-        Shape `(lanes, fingerprint_size(n))`; NaN for lanes without an orbit.
+        Shape `(motions, fingerprint_size(n))`; NaN for motions without an orbit.
     """
     z = (np.asarray(states) - origin) / scale
     lanes, keep, n = z.shape
@@ -82,7 +82,7 @@ class SharedCells:
         self._edges: list[np.ndarray] = []
 
     def add(self, cells) -> np.ndarray:
-        """Add motions with the cells they visit, shape `(lanes, keep)`.
+        """Add motions with the cells they visit, shape `(motions, keep)`.
 
         Returns:
             One cell of each motion, used to look up its group at the end.
@@ -104,7 +104,7 @@ class SharedCells:
 
 
 def cell_codes(states, origin, scale, fine: float) -> np.ndarray:
-    """Return the number of the cell of each state, shape `(lanes, keep)`.
+    """Return the number of the cell of each state, shape `(motions, keep)`.
 
     **Arguments:** `fine`: extent of a cell in units of `scale`.
     """

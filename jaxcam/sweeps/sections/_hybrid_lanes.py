@@ -42,7 +42,7 @@ def smallest_gaps(
 
 
 def admissible(system: HybridSystem, t0, states, where=None, values=None):
-    """Return whether each state is finite and not behind any constraint at `t0`."""
+    """Return whether each state is finite and penetrates no constraint at `t0`."""
     states = np.asarray(states, dtype=float)
     finite = np.all(np.isfinite(states), axis=1)
     batched, shared = split_lanes(as_arrays(system), where, values)
@@ -52,7 +52,7 @@ def admissible(system: HybridSystem, t0, states, where=None, values=None):
 
 
 def lifted(system: HybridSystem, t0, states, where=None, values=None) -> np.ndarray:
-    """Move states behind a constraint at `t0` onto it; the others are unchanged."""
+    """Move states that penetrate a constraint at `t0` onto it; others are unchanged."""
     states = np.asarray(states, dtype=float)
     if np.all(smallest_gaps(system, t0, states, where, values) >= 0):
         return states

@@ -31,7 +31,7 @@ class Samples(NamedTuple):
 
 
 BEHIND = -1
-"""Code of a start behind the constraint, or outside the domain of the map."""
+"""Code of a start that penetrates the constraint, or is outside the map's domain."""
 
 
 def with_lanes(old: Samples, which, new: Samples) -> Samples:

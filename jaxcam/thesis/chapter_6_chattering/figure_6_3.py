@@ -23,7 +23,7 @@ from .manifold import manifold_of
 
 
 _UNDER = 1 - 1e-11
-"""Reduction of the initial speed that turns the graze into an impact above rounding;
+"""Reduction of the initial speed that turns grazing into an impact above rounding;
 the impact speed grows with the square root of the reduction.
 """
 
@@ -35,7 +35,7 @@ class Series(NamedTuple):
     time: float
     speed: float
     until: float
-    """Time of the graze or of the release."""
+    """Time of grazing or of the release."""
     run: Trajectory
 
 
@@ -56,7 +56,7 @@ def series(system: CamFollower) -> list[Series]:
         for _ in range(k + 1):
             time, speed = impact_map(rig, time, speed)
         start = (float(times[middle]), float(speeds[middle]), float(time))
-        starts.append((f"{name}: ends in a graze", *start))
+        starts.append((f"{name}: ends in grazing", *start))
     _, time, speed, until = starts[0]
     starts.insert(0, ("slower than S$^1$: one more impact", time, 0.97 * speed, until))
     starts.insert(2, ("faster than S$^1$: one impact fewer", time, 1.03 * speed, until))
@@ -65,7 +65,7 @@ def series(system: CamFollower) -> list[Series]:
     time, speed = float(region.time[far]), float(region.speed[far])
     release = float(found.frame.release)
     starts.append(("C: accumulates at release", time, speed, release))
-    starts.append(("inside D: rests before release", time, 0.6 * speed, release))
+    starts.append(("inside D: sticks before release", time, 0.6 * speed, release))
     made = []
     prepared = rig.prepared()
     for name, time, speed, until in starts:
@@ -103,7 +103,7 @@ def draw(system: CamFollower) -> Figure:
         ax.plot(hit, np.zeros_like(hit), ".", color=IMPACT, ms=5)
         ax.axhline(0, color="0.4", lw=0.7)
         ax.set_title(one.name, fontsize=11)
-        # the long flight after the graze would hide it
+        # the long flight after grazing would hide it
         last = 1.25 * (one.until - start)
         near = drawn.time - start <= one.until - start
         top = 1.25 * np.nanmax(drawn.gap[near])
