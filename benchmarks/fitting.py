@@ -101,7 +101,7 @@ def main() -> None:
         f"all {whole:.1f} s of motion by scipy: {scaled:.1f} s of CPU an iteration, "
         f"{full:.0f} s for {other.iterations}; one fit here: {warm:.2f} s of CPU, "
         f"{own:.2f} s an iteration. Ratio {scaled / own:.0f} an iteration, "
-        f"{full / warm:.0f} a fit (asked: 20)"
+        f"{full / warm:.0f} a fit (target: 20)"
     )
 
 

@@ -128,8 +128,8 @@ def report(cases: list[dict]) -> None:
         if not right(one):
             print(
                 f"case {one['number']}: {' '.join(one['truth']) or 'nothing'} at level "
-                f"{one['level']:g}: {one['verdict']} {' '.join(one['names'])}, unseen "
-                f"{one['before']:.3f} -> {one['after']:.3f}"
+                f"{one['level']:g}: {one['verdict']} {' '.join(one['names'])}, "
+                f"held-out {one['before']:.3f} -> {one['after']:.3f}"
             )
 
 

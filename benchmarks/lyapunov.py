@@ -53,7 +53,8 @@ def main(lanes: int = 1000, turns: int = 2000, repeats: int = 3) -> None:
         calls, work=int(hits.sum()), repeats=repeats, reference="numba loop"
     )
     print(
-        f"core {CORE}, jax {jax.__version__}; {lanes} lanes, {turns} turns, impacts/s"
+        f"core {CORE}, jax {jax.__version__}; {lanes} trajectories, {turns} periods, "
+        "impacts/s"
     )
     print(_timing.table(rows))
     calm = exponents[:, 0] < 0
@@ -68,7 +69,7 @@ def main(lanes: int = 1000, turns: int = 2000, repeats: int = 3) -> None:
         f"{hits.sum()}); exponents that are negative differ by {np.median(gone):.1e} "
         f"(median); "
         f"sum rule missed by {np.abs(sums - rule)[free].max():.1e}, "
-        f"{np.sum(~free)} lanes that stick left out; "
+        f"{np.sum(~free)} trajectories that stick are omitted; "
         f"{np.mean(np.asarray(made.exponents)[:, 0] > 0.01):.0%} chaotic"
     )
 

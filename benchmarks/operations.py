@@ -27,19 +27,19 @@ from jaxcam.models import CamFollower, rpm_to_rad_s
 PARTS = {
     "step": "stages of the step",
     "error_norm": "stages of the step",
-    "jets": "gap, velocity, acceleration, jerk at two places",
-    "judge": "judging the flight",
-    "judge_contact": "judging the contact",
-    "rest_of_chatter": "completing a chatter",
-    "taylor": "landing and impact",
-    "velocity": "landing and impact",
-    "impact": "landing and impact",
+    "jets": "gap, velocity, acceleration, jerk at two points",
+    "judge": "checking the flight for events",
+    "judge_contact": "checking the contact for release",
+    "rest_of_chatter": "summing the remaining impacts of chatter",
+    "taylor": "event location, and impact",
+    "velocity": "event location, and impact",
+    "impact": "event location, and impact",
     "frame": "projection onto the surface",
     "onto": "projection onto the surface",
     "taylor_of_release": "projection onto the surface",
-    "after_attempt": "choosing the next step",
+    "after_attempt": "choosing the length of the next step",
 }
-OTHER = "everything else"
+OTHER = "other operations"
 
 
 def program():
@@ -113,7 +113,7 @@ def main() -> None:
         slow[part] += name in ("div", "sqrt")
     lost = set(PARTS.values()) - set(counts)
     if lost:
-        raise SystemExit(f"no operation is counted as {lost}: mend PARTS")
+        raise SystemExit(f"no operation is counted as {lost}; correct PARTS")
     total = counts.total()
     print("| part | operations | share | divisions, roots |")
     print("| --- | --- | --- | --- |")

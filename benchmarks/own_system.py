@@ -67,13 +67,17 @@ def main(side: int = 48, turns: int = 60, repeats: int = 3) -> None:
     }
     made, (samples, impacts) = ours(), calls["numba, order 8"]()
     rows = _timing.compare(calls, work=len(start) * turns, repeats=repeats)
-    print(f"forced pendulum at a wall: {len(start)} lanes, {turns} turns, core {CORE}")
+    print(
+        f"forced pendulum at a wall: {len(start)} trajectories, {turns} periods, "
+        f"core {CORE}"
+    )
     print(_timing.table(rows))
     error = np.abs(made.states - samples)[:, :5].max(axis=(1, 2))
     print(
         f"first 5 turns: median {np.median(error):.1e}, 90 % "
         f"{np.quantile(error, 0.9):.1e}; impacts {made.impacts.sum()} against "
-        f"{impacts.sum()}; failed lanes {int(np.sum(made.code != 0))}; attempts a turn "
+        f"{impacts.sum()}; failed trajectories {int(np.sum(made.code != 0))}; "
+        "attempts a turn "
         f"{made.steps.mean() / turns:.1f}"
     )
 

@@ -103,7 +103,7 @@ def nulls(verdicts: Verdicts, count: int, first: int) -> None:
     numbers = range(first, first + count)
     cases = [verdicts.get("none", 0.0, number) for number in numbers]
     wrong = [one for one in cases if one["verdict"] != "none"]
-    print(f"nulls: {len(wrong)} of {count} are not `none`")
+    print(f"without hidden physics: {len(wrong)} of {count} are not `none`")
     for one in wrong:
         print(f"  case {one['number']}: {one['verdict']} {' '.join(one['names'])}")
 

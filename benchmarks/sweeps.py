@@ -99,11 +99,11 @@ def kept(repeats: int, side: int) -> None:
         idle = " and ".join(
             f"{idle_slots(call):.1%}" for call in (bare, swept_to(swept))
         )
-        print(f"attempts of idle slots: {idle}")
+        print(f"attempts at idle batch positions: {idle}")
 
 
 def idle_slots(call) -> float:
-    """Share of the attempts that the compiled loop made in empty slots."""
+    """Share of the attempts that the compiled loop made at empty batch positions."""
     slots, steps, compiled = [], [], _refilled_lanes.compiled_chunk
 
     def counted(start, *others):

@@ -99,8 +99,8 @@ class Point:
         """
         if self.problem is None:
             raise ValueError(
-                "this point has no problem; read its file with load_branch(path, "
-                "problem)"
+                "the continuation problem was not read with this point; use "
+                "load_branch(path, problem)"
             )
         return self.problem
 

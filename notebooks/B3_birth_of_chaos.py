@@ -49,9 +49,9 @@ rig = preset("calibrated")
 
 # ## The interruption of chatter
 #
-# At the interruption, the impacts accumulate exactly at the release. The sticking time
-# falls to zero as a power of the distance in speed, so ordinary root finders fail.
-# Instead we find the zero of a smooth margin.
+# At the interruption, the impacts accumulate exactly at the release, and the sticking
+# time falls to zero. It is no smooth function of the speed there, so we do not search
+# for its zero but for that of a smooth function, the margin (see `docs/chatter.md`).
 
 bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
 critical = continuation.chatter_interruption(rig, speed, bracket)

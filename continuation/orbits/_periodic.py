@@ -66,8 +66,8 @@ def periodic_orbits(
     if orbit.sticks:
         if number == 0:
             raise ValueError(
-                "this orbit sticks without forcing; only orbits that stick once in a "
-                "number of forcing periods can be followed"
+                "this orbit sticks, but the system has no forcing; a branch of orbits "
+                "that stick needs a forced system"
             )
         problem, state = on_release(system, number, beyond)
         return Start(problem, state)

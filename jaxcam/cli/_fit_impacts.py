@@ -16,7 +16,7 @@ def is_table(case: Path, files: Files) -> bool:
 
 
 def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
-    """Print the restitution laws fitted to the impacts, and write them as data.
+    """Print the restitution laws fitted to the impacts, and write them to a JSON file.
 
     Raises:
         ValueError: The table is invalid; the message names the row and the fix.

@@ -12,7 +12,7 @@ _SOURCE = "source"
 
 
 def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
-    """Return a system as data, with the source file if it is outside the package.
+    """Return a system as JSON, with the source file if it is outside the package.
 
     A system that cannot be saved yields `about`, and the reason as `not_saved`.
     """

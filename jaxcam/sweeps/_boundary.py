@@ -122,9 +122,8 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
             found.append((distance, different / total))
     if len(found) < 2:
         raise ValueError(
-            "fewer than two distances have states that lead to different attractors; "
-            "use a finer "
-            "grid, or one with a boundary in it"
+            "there are uncertain states at fewer than two distances; use a finer grid, "
+            "or one that contains a basin boundary"
         )
     # slow to import, and needed only for this line
     from scipy.stats import linregress

@@ -44,7 +44,7 @@ def events(up: Diagram, down: Diagram) -> Events:
 
     Contact, the orbits that follow from it, and the beginning of aperiodic motion are
     taken from the upward sweep; orbits with one impact per cycle from the downward
-    sweep, P(1,1) below its doubled orbit P(2,2). The chattering route to chaos begins
+    sweep, P(1,1) below its doubled orbit P(2,2). The chatter route to chaos begins
     after the last speed with P(inf,1). It ends, with the resulting chaos, at the first
     upward speed on the period-doubling cascade or, failing that, at the last speed.
     """

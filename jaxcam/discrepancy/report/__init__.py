@@ -1,4 +1,4 @@
-"""Report a verdict as data and in words."""
+"""Report a verdict as text and as JSON."""
 
 from ._caveats import Caveat as Caveat, Reason as Reason
 from ._diagnosis import (

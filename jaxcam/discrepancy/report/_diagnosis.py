@@ -1,4 +1,4 @@
-"""The result of a diagnosis: verdict and evidence, as text and as data."""
+"""The result of a diagnosis: verdict and evidence, as text and as JSON."""
 
 import dataclasses
 import enum

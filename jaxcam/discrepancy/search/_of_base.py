@@ -55,7 +55,7 @@ def channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
 def usual_state(
     system, sensors: Mapping[str, Sensor], runs: Sequence[Recording]
 ) -> Float[np.ndarray, " n"]:
-    """Return the mean of the measured components of a state, zero for the others."""
+    """Return the median of each measured component of the state; zero for others."""
     picks = {name: sensor.observe for name, sensor in sensors.items()}
     state = np.zeros(size_of(system, picks))
     for name, pick in picks.items():

@@ -177,7 +177,8 @@ class Attempts:
 
         **Arguments:** values of system and plan, `(k,)` and `(elements, k)`; values of
         the states, `(elements, k)`, which are changed in place; the log,
-        `(elements, places, k)`, which begins with place `first`; and a callback between calls.
+        `(elements, places, k)`, which begins with place `first`; and a callback
+        between calls.
 
         **Returns:** the number of attempts in each slot.
         """

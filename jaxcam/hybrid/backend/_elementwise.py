@@ -222,8 +222,8 @@ def _of_integers(w: Writer, name: str, dtype, x):
 
 @no_type_check
 def _quotient(w: Writer, name: str, signed: bool, x):
-    """Divide integers: division by zero gives -1 and the dividend as remainder; so does
-    the smallest number divided by -1.
+    """Divide integers. Division by zero gives -1, and the dividend as remainder; the
+    smallest number divided by -1 gives itself, and remainder 0.
     """
     b, (over, under) = w.builder, x
     zero, one, least = w.like(under, 0), w.like(under, 1), w.like(under, -1)

@@ -275,7 +275,7 @@ def _flight(sides, span, boundaries, left: set[int], doubted) -> Flight:
     clear.append(_clear_of(doubted, span, len(motion.time)))
     first, last = max(a for a, _ in clear), min(b for _, b in clear)
     start, stop = (boundaries[place] for place in span)
-    hidden = "an impact may hide between here and the end of the recording"
+    hidden = "an impact between here and the end of the recording may be undetected"
     start = start if first == span[0] else _end(motion, min(first, last - 1), hidden)
     stop = stop if last == span[1] else _end(motion, last - 1, hidden)
     height = float(np.max(motion.gap[first:last], initial=0.0))

@@ -15,7 +15,7 @@ WORDS = Events(
     "permanent contact, to",
     "P(inf,1), from",
     "P(inf,1), to",
-    "chattering route to chaos, from",
+    "chatter route to chaos, from",
     "chaos, to",
     "P(1,1), from",
     "P(1,1), to",

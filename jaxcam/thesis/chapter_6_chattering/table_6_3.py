@@ -1,7 +1,7 @@
 """Table 6.3: derivatives of the local map with respect to the cam speed.
 
 The thesis estimates them from perturbed simulations. The derivative of lambda is given
-twice: with D* held fixed, and with D* moving with the orbit.
+twice: with D* fixed, and with D* moving with the orbit.
 """
 
 import numpy as np
@@ -42,7 +42,7 @@ def compute(system: CamFollower) -> Rows:
     held, moving = float(local.by_parameter) * rpm, float(local.incidence) * rpm
     return [
         ("speed", REFERENCE, rad_s_to_rpm(rig.speed), "rpm"),
-        ("d lambda/d speed, D* held", BY_SPEED, held, "1/rpm"),
+        ("d lambda/d speed, D* fixed", BY_SPEED, held, "1/rpm"),
         ("d lambda/d speed, D* moving", BY_SPEED, moving, "1/rpm"),
         ("d Gamma/d speed", VELOCITY, velocity, "rad/s/rpm"),
         ("d Omega/d speed", ANGLE, gap, "rad/rpm"),
