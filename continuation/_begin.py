@@ -58,7 +58,8 @@ def leave(
                 return outwards, step
         step /= 2
     raise ValueError(
-        "no branch leaves the start along the given tangent; is it a special point?"
+        "no branch leaves the start along the given tangent; start from a regular "
+        "point, or use switch at a special point"
     )
 
 

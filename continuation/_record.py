@@ -116,9 +116,13 @@ def read_branch(
         lines = text.split("\n")[:-1]
         header, *rest = [json.loads(line) for line in lines]
     except (ValueError, RecursionError):
-        raise ValueError(f"{path} is not a saved branch; it is not JSON") from None
+        raise ValueError(
+            f"{path} is not JSON; give a file written by save_branch"
+        ) from None
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ValueError(f"{path} is not a saved branch")
+        raise ValueError(
+            f"{path} is not a saved branch; give a file written by save_branch"
+        )
     if header.get("version") != VERSION:
         raise ValueError(
             f"{path} has version {header.get('version')} of the format, but this "

@@ -11,10 +11,11 @@
 # The recordings are of a pendulum, falling balls, a marble that bounces on paper, a
 # positioning stage, and a mounting head that places components. Each has a textbook
 # model of a few lines, and `diagnose` determines what this model lacks. (Notebook A4
-# tests how well the completed models predict another recording in free runs.) The
-# diagnosis is used in the same way for all recordings: every model specifies its
-# parameters, its sensor and the noise of the sensor, and the terms come from one
-# library. The models that A4 also needs are in `textbook_models.py`.
+# tests how well the completed models predict another recording in free runs.) Every
+# model specifies its parameters, its sensor and the noise of the sensor, and the terms
+# come from one library. Terms that a model already contains, or that cannot occur, are
+# excluded; for the mounting head, only two terms are tried. The models that A4 also
+# needs are in `textbook_models.py`.
 #
 # The recordings are public. The package contains only those of the pendulum, reduced to
 # every tenth sample (`jaxcam.data.PENDULUM`):
@@ -337,7 +338,8 @@ ask(
 # A head that places components on a board is driven by a motor; the voltage is the
 # input and the position is the output. The model is a mass with a spring and a damper.
 # The head touches the board at an unknown position. There is only one recording; its
-# two halves are used as two recordings.
+# two halves are used as two recordings. Only an elastic stop and Coulomb friction are
+# tried as terms, because a diagnosis with the complete library takes too long.
 
 # +
 _, *halves = read_head(folder)

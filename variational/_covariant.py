@@ -96,8 +96,8 @@ def covariant_vectors(
     """
     if system.period is None:
         raise ValueError(
-            "this system has no forcing period; covariant vectors are computed once "
-            "per period"
+            "this system has no forcing period; give it a `period`, because covariant "
+            "vectors are computed once per period"
         )
     if turns < 1 or transient < 1:
         raise ValueError(

@@ -157,8 +157,8 @@ def _check(system, turns: int, turn: float | None, blocks: int, paired: bool) ->
         raise ValueError("this system has no forcing period; pass turn=... in seconds")
     if not 2 <= blocks <= turns:
         raise ValueError(
-            f"{turns} turns cannot be divided into {blocks} blocks; give at least two "
-            "blocks, and at least as many turns"
+            f"{turns} periods cannot be divided into {blocks} blocks; give at least "
+            "two blocks, and at least as many periods"
         )
     if not paired:
         raise ValueError(

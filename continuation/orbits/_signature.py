@@ -15,7 +15,10 @@ def without_impact(equations: Shooting, u, parameters, number: int):
         rows = _renumbered(periods, rows, number)
         return _with(equations, hits), rows.ravel()
     if periods == 0:
-        raise ValueError("an orbit without forcing must keep at least one impact")
+        raise ValueError(
+            "an orbit without forcing must keep at least one impact; follow the orbit "
+            "without impacts as a LimitCycle"
+        )
     length = float(equations.period(jnp.asarray(u), parameters))
     start = rows[0, 0] / periods * length
     end = np.ceil(start / length) * length

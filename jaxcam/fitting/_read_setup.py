@@ -226,7 +226,7 @@ def _records(
             if name in taken:
                 raise inner.error(
                     name,
-                    "is fitted or measured, so no recording can state it",
+                    "is fitted or measured; remove it from [records]",
                 )
             values[name] = inner.quantity(key, None).value
         found[pattern] = values

@@ -194,7 +194,9 @@ def _check_times(system, period, turns, skip) -> None:
     if turns < 1:
         raise ValueError(f"turns is {turns}; give the number of periods, 1 or more")
     if not 0 <= skip < turns:
-        raise ValueError(f"skip is {skip}; it must be less than the {turns} turns")
+        raise ValueError(
+            f"skip is {skip}; give a number below {turns}, the number of periods"
+        )
 
 
 def _check(batched, shared, settings, t0, period, states) -> None:

@@ -59,8 +59,8 @@ def cell_mapping(
     section = as_section(system)
     if not section.regular or turns < 1:
         raise ValueError(
-            "cell mapping needs a section that is sampled once per period, and at "
-            "least 1 period"
+            "cell mapping needs a section that is sampled once per period, and turns "
+            "of at least 1"
         )
     states = grid.states()
     images = []

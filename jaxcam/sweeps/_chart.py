@@ -92,7 +92,7 @@ def chart(
         raise ValueError("where must be a tuple of two parameters: (one, other)")
     if exponents and exponents < 16:
         raise ValueError(
-            f"exponents is {exponents}; give at least 16 turns, or 0 for none"
+            f"exponents is {exponents}; give at least 16 periods, or 0 for none"
         )
     if block is not None and block < 1:
         raise ValueError(f"block is {block}; give 1 or more values")

@@ -41,7 +41,7 @@ def check_turns(
     """Raise `ValueError` for inconsistent numbers."""
     if not 1 <= keep <= turns:
         raise ValueError(
-            f"keep is {keep} and turns is {turns}; keep at least 1 of the turns"
+            f"keep is {keep} and turns is {turns}; keep at least 1 of these periods"
         )
     if not 0 < period_tolerance < 1:
         raise ValueError(

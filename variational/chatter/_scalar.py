@@ -14,8 +14,8 @@ def check_chatter_system(system: HybridSystem) -> None:
     """Raise `ValueError` for a system without the period that chatter theory needs."""
     if system.period is None:
         raise ValueError(
-            "this system has no forcing period, which is needed for chatter that ends "
-            "at a release"
+            "this system has no forcing period; give it a `period`, which is needed "
+            "for chatter that ends at a release"
         )
 
 

@@ -54,7 +54,9 @@ class Orbit(Printed):
     contacts: Contacts
     """The intervals of sustained contact in one period."""
     closure: Float[Array, ""]
-    """Largest deviation from the given state after one period."""
+    """Largest deviation from the given state after one period, relative to
+    [`jaxcam.hybrid.sizes.component_sizes`][].
+    """
     monodromy: Float[Array, "n n"]
     """Derivative of the state after one period with respect to `state`, shape `(n, n)`.
     """
@@ -216,9 +218,9 @@ def _length(system, period) -> float:
 def _check_closure(miss, closure, period) -> None:
     if not miss <= closure:
         raise ValueError(
-            f"the motion does not return to this state: after {period:g} s, it differs "
-            f"by {miss:.1e}; give a state and period closer to the orbit, or find it "
-            "with continuation.periodic_orbit"
+            f"the motion does not return to this state: after {period:g} s, the "
+            f"relative difference is {miss:.1e}; give a state and period closer to the "
+            "orbit, or find it with continuation.periodic_orbit"
         )
 
 

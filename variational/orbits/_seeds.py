@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 
 _STEPS = (16, 32, 64, 128, 256)
-"""Available numbers of steps, and the allowed error of a flight."""
+"""Available numbers of steps."""
 _ALLOWED = 1e-12
+"""Allowed error of a flight."""
 
 
 def steps_for(system: HybridSystem, starts, ends) -> int:
@@ -42,7 +43,7 @@ def steps_for(system: HybridSystem, starts, ends) -> int:
     if not wrong < 1e-9:
         raise ValueError(
             f"with {_STEPS[-1]} eighth-order steps, the error of a flight is "
-            f"{wrong:.0e}; the vector field is stiff or not smooth there"
+            f"{wrong:.0e}; use a system whose vector field is smooth and not stiff"
         )
     return _STEPS[-1]
 
@@ -84,7 +85,10 @@ def seed(
     if int(motion.impacts.count):
         return _of_impacts(system, motion.impacts, length, periods, dimension)
     if periods == 0:
-        raise ValueError("an orbit without forcing must have an impact to be continued")
+        raise ValueError(
+            "an orbit without forcing must have an impact to be continued as "
+            "ImpactingOrbits; follow it as a LimitCycle"
+        )
     # the state at a whole number of periods
     whole = -np.floor(-(t0 / length - 1e-12)) * length
     if isinstance(motion, Trajectory):

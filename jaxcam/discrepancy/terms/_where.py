@@ -4,7 +4,7 @@ import enum
 
 
 class Where(enum.StrEnum):
-    """The part of the model in which an effect acts; equal to its name as a string."""
+    """The part of the model in which an effect acts, as a string such as `"flight"`."""
 
     FLIGHT = "flight"
     IMPACT = "impact"

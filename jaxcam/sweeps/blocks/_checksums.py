@@ -96,7 +96,7 @@ def checked(path: str | Path) -> xarray.Dataset:
         ValueError: Blocks are missing or damaged; the message names them.
     """
     if stored_identity(Path(path)) is None:
-        raise ValueError(f"{path} is not a stored sweep")
+        raise ValueError(f"{path} is not a stored sweep; give the .zarr folder of one")
     wrong = faults(zarr.open_group(str(path), mode="r"))
     bad = [block for block, word in enumerate(wrong) if word]
     if bad:

@@ -78,6 +78,8 @@ def run_blocks(
 ) -> Store:
     """Compute the missing blocks of a sweep and store each when it is finished.
 
+    An interruption (Ctrl-C) loses only the blocks in progress.
+
     Args:
         job: The sweep.
         out: Folder for a Zarr group; by default, results are kept in memory.
@@ -93,8 +95,7 @@ def run_blocks(
 
     Raises:
         ValueError: The folder contains something else.
-        RuntimeError: Workers were lost. An interruption (Ctrl-C) loses only the blocks
-            in progress.
+        RuntimeError: Workers were lost.
     """
     layout = job.layout
     store = Memory(layout) if out is None else OnDisk(out, layout, resume)
