@@ -54,8 +54,8 @@ class BranchSettings(eqx.Module):
     def __check_init__(self):
         if not 0 < self.tolerance < 1e-2:
             raise ValueError(
-                f"tolerance is {self.tolerance:g}; give a number between 1e-14 and "
-                "1e-2, such as 1e-10"
+                f"tolerance is {self.tolerance:g}; give a positive number below 1e-2, "
+                "such as 1e-10"
             )
         if not 0 < self.min_step <= self.step <= self.max_step:
             raise ValueError(

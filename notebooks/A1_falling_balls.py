@@ -12,9 +12,9 @@
 # them twice (de Silva et al. 2020, MIT licence). According to the textbook, all balls
 # fall in the same way. Do they?
 #
-# The recordings are not part of the package. Set the environment variable
-# `JAXCAM_RECORDINGS` to their folder; without it this notebook prints a message and
-# stops.
+# The recordings are not part of the package. Put them into the folder `real/ball_drop`,
+# and set the environment variable `JAXCAM_RECORDINGS` to the folder that contains
+# `real`. Without it this notebook prints a message and stops.
 
 # +
 import os
@@ -30,7 +30,7 @@ from jaxcam.plotting import residual_by_mode, style
 from jaxcam.recordings import compare, merge, read_case, segment
 
 
-root = Path(os.environ.get("JAXCAM_RECORDINGS", "../shared/recordings"))
+root = Path(os.environ.get("JAXCAM_RECORDINGS", "."))
 folder = root / "real" / "ball_drop"
 if not folder.is_dir():
     print(f"Skipped: there is no folder {folder}; set JAXCAM_RECORDINGS.")
@@ -69,7 +69,7 @@ parts = {
 }
 comparison = merge(list(parts.values()))
 
-print(f"{'drop':24} {'rms [m]':>8} {'times the noise':>16}")
+print(f"{'drop':24} {'rms (m)':>8} {'times the noise':>16}")
 for name, part in parts.items():
     row = part.row("flight")
     print(f"{name:24} {row.rms:8.2f} {row.ratio:16.1f}")

@@ -212,9 +212,9 @@ def _shapes(plt, found: Diagnosis):
     for axis in axes.flat[len(before) :]:
         axis.axis("off")
     for axis, name in zip(axes.flat, before):
-        _band(axis, before[name], RECORDED, "textbook")
+        _band(axis, before[name], RECORDED, "textbook model")
         if name in after:
-            _band(axis, after[name], IMPACT, "found")
+            _band(axis, after[name], IMPACT, "with the missing effects")
         axis.axhline(0.0, color="k", lw=0.6)
         one = before[name]
         axis.set_title(spelled(name), fontsize=11)

@@ -195,7 +195,7 @@ def _check_times(system, period, turns, skip) -> None:
         raise ValueError(f"turns is {turns}; give the number of periods, 1 or more")
     if not 0 <= skip < turns:
         raise ValueError(
-            f"skip is {skip}; give a number below {turns}, the number of periods"
+            f"skip is {skip}; give 0 or more, and less than the {turns} periods"
         )
 
 

@@ -45,7 +45,7 @@ def inadmissible(
         if not value >= -room * 2 * math.pi / float(period):
             return (
                 f"at impact {k}, the motion is away from the constraint: the flight "
-                "would have to come from behind it"
+                "before it would penetrate the constraint"
             )
     if not float(error) < _ERROR:
         return (

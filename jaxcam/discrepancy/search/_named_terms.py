@@ -25,8 +25,9 @@ def with_terms(
         parameters: Its parameters.
         terms: Names from `library(extended=True)`, or terms of your own that act on the
             first coordinate. Their strengths are initially zero.
-        recordings: Recordings from which the terms take their scales: the mean and the
-            range of the positions, and the speed over which dry friction changes sign.
+        recordings: Recordings from which the terms take their scales: the range of the
+            positions, typical speeds and accelerations, and the speed over which dry
+            friction changes sign.
 
     Returns:
         The model with the terms in its system, and all parameters.
