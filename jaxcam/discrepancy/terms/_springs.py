@@ -33,7 +33,7 @@ class ConstantForce(ScaledTerm):
 
 
 class LinearSpring(ScaledTerm):
-    """A spring about the mean position, `-k1 (q - middle)`."""
+    """A spring about the middle of the range of positions, `-k1 (q - middle)`."""
 
     name: ClassVar[str] = "linear_spring"
     sentence: ClassVar[str] = "a force proportional to the deflection"
