@@ -59,7 +59,9 @@ class FreeRun:
 
     @property
     def rmse(self) -> dict[str, float]:
-        """Root-mean-square difference of each channel, in its unit."""
+        """Root-mean-square difference of each channel, in its unit, after the first
+        `samples`.
+        """
         return {
             name: float(np.sqrt(np.nanmean(self.residual(name)[self.samples :] ** 2)))
             for name in self.simulated

@@ -213,7 +213,7 @@ def _misfit(values, data, law, names):
 
 
 def _huber(off):
-    """Return the square root of Huber's loss, with the sign of the misfit."""
+    """Return the square root of twice Huber's loss, with the sign of the misfit."""
     size = jnp.abs(off)
     safe = jnp.where(size > _HUBER, size, _HUBER)
     return jnp.where(

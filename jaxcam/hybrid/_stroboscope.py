@@ -228,7 +228,9 @@ def _check(batched, shared, settings, t0, period, states) -> None:
 
 @eqx.filter_jit
 def _starts(batched, shared, period, t0, states):
-    """Return, per trajectory, smallest gap, its sign, period and restitution."""
+    """Return, per trajectory, the smallest gap, whether it penetrates, the period and
+    the coefficients of restitution.
+    """
 
     def one(batched, state):
         system = eqx.combine(batched, shared)

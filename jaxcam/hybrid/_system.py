@@ -116,7 +116,7 @@ class HybridSystem(eqx.Module):
         return None
 
     def constraint_name(self, number: int) -> str:
-        """Return the name of a constraint, by default `constraint 1` and so on."""
+        """Return the name of a constraint, by default `constraint 0` and so on."""
         names = self.constraint_names
         return names[number] if number < len(names) else f"constraint {number}"
 

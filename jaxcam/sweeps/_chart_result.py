@@ -43,7 +43,9 @@ class Chart:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels as text, shape `(l, k, starts)`; "chaotic" for a positive exponent."""
+        """Labels as text, shape `(l, k, starts)`; "chaotic" for an aperiodic motion
+        whose exponent exceeds three standard errors.
+        """
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
         found = label_names(numbers)
         if "exponent" in self.dataset:

@@ -40,8 +40,8 @@ def sure(
 
 
 def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
-    """Return the strengths of a term relative to their bootstrap deviation; below one,
-    they may be zero.
+    """Return the squared strengths of a term in units of their standard errors, summed
+    and divided by the critical value; below one, they may be zero.
     """
     own = [one.name for one in trials.term(name).strengths() if not one.inner]
     found = [best.fit[one] for one in own]

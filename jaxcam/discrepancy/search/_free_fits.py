@@ -242,7 +242,7 @@ class FreeFits:
     def _freedom(
         self, subset: Missing | Subset, found: Fit, functions: Sequence[Any]
     ) -> float:
-        """Return the contribution of sums of sines to the logarithm of the evidence."""
+        """Return the contribution of sums of sines to `score`: their Occam factor."""
         if not functions:
             return 0.0
         heat = heat_of(found)

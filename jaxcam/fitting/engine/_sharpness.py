@@ -36,7 +36,7 @@ def width_of(number: int) -> int:
 
 
 def shared_width(free: int, most: int) -> int:
-    """Return the number of columns of a program for a subset of the numbers.
+    """Return the number of columns of a program for a subset of the parameters.
 
     A small set is always computed completely, so that one program suffices for every
     choice; a large set is rounded up to a multiple of 32.

@@ -34,7 +34,9 @@ def match_orbits(first, second, scale, most: float, labels=None) -> dict[int, in
 
 
 def orbit_distance(first, second, scale) -> float:
-    """Return the mean distance of the points of two orbits, in either direction."""
+    """Return the mean distance of the points of an orbit from another orbit: the larger
+    of the values for the two directions.
+    """
     a, b = (np.asarray(orbit) / scale for orbit in (first, second))
     a, b = a[np.all(np.isfinite(a), axis=1)], b[np.all(np.isfinite(b), axis=1)]
     if not len(a) or not len(b):
