@@ -1,4 +1,4 @@
-"""Operations of the LLVM back end against those of XLA, one by one."""
+"""Operations of the LLVM backend against those of XLA, one by one."""
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +26,7 @@ def _pairs(seed: int, count: int = 200):
 
 
 def _both(function, own, width=None):
-    """Results of the back end and of XLA, each `(count, results)`."""
+    """Results of the backend and of XLA, each `(count, results)`."""
     own = np.asarray(own)
 
     def listed(_, own):

@@ -1,5 +1,5 @@
-"""A recorded pendulum swing and the fitted model: nearly all residuals lie within a
-band of plus or minus twice the noise, so the model explains the recording."""
+"""A simulated recording of a pendulum and the fitted model: nearly all residuals lie
+within a band of plus or minus twice the noise, so the model explains the recording."""
 
 import jax.numpy as jnp
 import numpy as np

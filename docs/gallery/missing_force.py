@@ -1,5 +1,5 @@
-"""The force that a model lacks, identified from a recording: a polynomial in the
-velocity is fitted together with the stiffness, here to a pendulum with air drag."""
+"""The force that a model lacks, identified from a simulated recording: a polynomial in
+the velocity is fitted together with the stiffness, here to a pendulum with air drag."""
 
 import jax
 import jax.numpy as jnp
