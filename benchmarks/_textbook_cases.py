@@ -18,7 +18,7 @@ SAMPLES = 2048
 SIZES = (1.0, 0.7, 0.85)
 # Tolerances of a linear oscillator, relative to its parameters
 TOLERANCES = {"stiffness": 0.05, "damping": 0.5, "gain": 0.02}
-# Tolerances of the stop, as a share of its position, and of the restitution
+# Tolerances of the stop, as a fraction of its position, and of the restitution
 STOP_TOLERANCE, RESTITUTION_TOLERANCE = 0.005, 0.08
 
 

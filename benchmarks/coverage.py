@@ -2,11 +2,11 @@
 
 Rigs are drawn at random from the tolerance box, simulated by a scalar Runge-Kutta loop
 that shares no code with the fit, recorded through noisy encoders at three noise levels,
-cut, and fitted. The script prints, for each level and parameter, the share of intervals
-that contain the true value, and the mean (bias) and spread of the errors in standard
-errors; and the residuals. Parameters that the data do not determine depend on the
-tolerances, so only another rig is an independent case: many rigs are more informative
-than many noise realizations.
+cut, and fitted. The script prints, for each level and parameter, the fraction of
+intervals that contain the true value, and the mean (bias) and spread of the errors in
+standard errors; and the residuals. Parameters that the data do not determine depend on
+the tolerances, so only another rig is an independent case: many rigs are more
+informative than many noise realizations.
 
 The bias has two parts: one from the choice of rigs, which a linear model without noise
 would also have, and the rest, which is due to the fit. Both are printed with their
@@ -21,7 +21,7 @@ then known several times more accurately than from the same number of independen
 `--truth normal` draws the rigs from the Gaussian that represents a tolerance in the
 fit; the difference from `box` is the effect of the box shape. `--profile` checks for
 some parameters whether the profile-likelihood interval contains the true value. The
-last line is the share of cases in which all parameters together are inside the 95 %
+last line is the fraction of cases in which all parameters together are inside the 95 %
 ellipsoid, and inside the region bounded by the cost itself.
 
     python benchmarks/coverage.py --rigs 20 --draws 5

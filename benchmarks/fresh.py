@@ -5,8 +5,8 @@ random speeds, made by a scalar loop (`_numba_rig`) that shares no code with the
 diagnosis. Of twenty cases, three lack nothing, thirteen lack one term, and four lack
 two. A strength is the unit of a term (roughly a typical defect) times one of `LEVELS`;
 most effects are partly absorbed when the rig parameters are refitted. The script prints
-one line per case and the shares of correct verdicts, and stores each verdict in a file
-of JSON lines, from which an interrupted run resumes.
+one line per case and the fractions of correct verdicts, and stores each verdict in a
+file of JSON lines, from which an interrupted run resumes.
 
     python -m benchmarks.fresh --cases 40 [--rig rig.toml]
 """

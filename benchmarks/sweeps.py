@@ -58,7 +58,7 @@ def swept_to(work):
 
 
 def kept(repeats: int, side: int) -> None:
-    """Print the relative speed of the sweep and the share of wasted steps."""
+    """Print the relative speed of the sweep and the fraction of wasted steps."""
     system, grid, turns = rig(), states_at_145(side), 30
     states, lanes = grid.states(), side * side
     sweep = _workloads.sweep()

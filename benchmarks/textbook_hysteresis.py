@@ -4,7 +4,7 @@ Along the true motion of `_textbook_cases.py`, the internal state of a hysteresi
 integrated for a grid of parameters, and its force is fitted together with a constant, a
 stiffness and a damping. The best point of the grid is then improved by the method of
 Nelder and Mead. Printed is what remains of the force that no linear oscillator has, as
-a share of its rms, for both kinds of hysteresis that a diagnosis tries.
+a fraction of its rms, for both kinds of hysteresis that a diagnosis tries.
 
     python -m benchmarks.textbook_hysteresis bouc_wen
 """
@@ -44,7 +44,7 @@ def states(deflection, loading, unloading, power) -> np.ndarray:
 
 
 def remaining(case, motion, loading, unloading, power) -> np.ndarray:
-    """Rms of the force that remains, as a share of that of the extra force."""
+    """Rms of the force that remains, as a fraction of that of the extra force."""
     x, v = motion.states[:, 0], motion.states[:, 1]
     force = case.force(x, v, motion.states[:, 2])
     count = _FINE * (len(x) - 1) + 1

@@ -27,7 +27,7 @@ from jaxcam.fitting import read_setup
 
 
 _DURATION = 6.0
-# An effect must act in more than this share of the samples or impacts
+# An effect must act in more than this fraction of the samples or impacts
 _SEEN = 0.05
 # Maximum number of rigs in which an effect is tried
 _DRAWS = 40

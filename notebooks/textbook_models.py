@@ -52,7 +52,7 @@ hinge = [
 def read_swings(folder: Path) -> list[Segments]:
     """Read the swings of the pendulum, each until the pendulum stops.
 
-    Every tenth sample is kept: 10 ms is a seventieth of a swing, and at 1000 samples
+    Every tenth sample is kept: 10 ms is an eightieth of the period, and at 1000 samples
     per second the rounding errors of neighbouring samples are the same.
     """
     swings = []

@@ -76,7 +76,7 @@ def test_a_run_that_failed_is_no_end_of_sticking(monkeypatch, calibrated):
     table = figure_5_11.TARGET.table(calibrated, "default")
     computed = table.set_index("quantity")["computed"]
     assert computed["first speed without P(inf,1)"] == pytest.approx(152.66)
-    assert computed["share of the speeds above it with a periodic motion"] == 0.5
+    assert computed["fraction of the speeds above it with a periodic motion"] == 0.5
     assert computed["speeds at which the run failed"] == 2
 
 

@@ -143,7 +143,7 @@ def _table(shares):
     from rich.table import Table
 
     table = Table(title="attractors")
-    for column in ("attractor", "share of initial states", "standard error"):
+    for column in ("attractor", "fraction of initial states", "standard error"):
         table.add_column(column)
     for name, share in shares.items():
         table.add_row(name, f"{share.share:.4%}", f"{share.stderr:.4%}")

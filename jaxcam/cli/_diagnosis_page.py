@@ -64,7 +64,7 @@ def _effects(found: Diagnosis) -> list[str]:
         "effect",
         "parameters",
         "where",
-        "share of the misfit",
+        "fraction of the misfit",
         "BIC",
         "gain in held-out ln L",
         "bootstrap",

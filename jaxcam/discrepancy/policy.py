@@ -76,18 +76,18 @@ class Policy:
     )
     sure: float = _decides(
         0.9,
-        "share of the bootstrap samples that must retain a named term, and probability "
-        "that an effect at its detection limit is named",
+        "fraction of the bootstrap samples that must retain a named term, and "
+        "probability that an effect at its detection limit is named",
     )
     most_terms: int = _decides(3, "maximum number of named terms")
     form_error: float = _decides(
         0.15,
         "maximum relative error of the functional form of a named term; its square is "
-        "the share of the explained cost that may remain",
+        "the fraction of the explained cost that may remain",
     )
     corner_share: float = _decides(
         3e-4,
-        "share of the explained cost that the smoothing of dry friction at zero "
+        "fraction of the explained cost that the smoothing of dry friction at zero "
         "velocity may leave; next to a friction term, a term that explains less is not "
         "named",
     )
@@ -96,17 +96,17 @@ class Policy:
     )
     explains: float = _decides(
         0.5,
-        "maximum share of the textbook model's cost that the best subset may leave if "
-        "no fit is near the data",
+        "maximum fraction of the textbook model's cost that the best subset may leave "
+        "if no fit is near the data",
     )
     alike: float = _decides(
         1e-8,
-        "minimum share of the information on a parameter that must remain when the "
+        "minimum fraction of the information on a parameter that must remain when the "
         "other parameters are free",
     )
     untold: float = _decides(
         1e-3,
-        "minimum share of the information on a term that one half of the recordings "
+        "minimum fraction of the information on a term that one half of the recordings "
         "must contain to estimate it",
     )
     stretches: int = _decides(4, "maximum number of bootstrap blocks per recording")
@@ -128,7 +128,8 @@ class Policy:
         4, "sections per recording in that test; the worst one is ignored"
     )
     velocity_tail: float = _decides(
-        0.005, "share of the velocities beyond each end of a velocity function's range"
+        0.005,
+        "fraction of the velocities beyond each end of a velocity function's range",
     )
     drive_wander: float = _decides(
         0.75,
@@ -174,7 +175,8 @@ class Policy:
         50.0, "difference in BIC up to which a subset is extended further"
     )
     helped: float = _bounds(
-        0.7, "maximum share of the cost that a term may leave for the search to go on"
+        0.7,
+        "maximum fraction of the cost that a term may leave for the search to go on",
     )
     clear: float = _bounds(
         10.0,
@@ -197,7 +199,8 @@ class Policy:
         4, "minimum number of step attempts during these steps"
     )
     crawl_gain: float = _bounds(
-        0.01, "share of the remaining cost below which the gain in these steps is slow"
+        0.01,
+        "fraction of the remaining cost below which the gain in these steps is slow",
     )
     late: int = _bounds(
         8, "attempts after which a fit must be better than the subset it extends"
@@ -210,7 +213,7 @@ class Policy:
     )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
-        "correlation lengths of a free function, as shares of the range of its "
+        "correlation lengths of a free function, as fractions of the range of its "
         "argument, or in radians of a phase",
     )
     function_sizes: tuple[float, ...] = _bounds(
@@ -228,7 +231,7 @@ class Policy:
     )
     outdone: float = _bounds(1.25, "multiple of the curve's cost that a form must beat")
     enough: float = _bounds(
-        0.1, "share of the tolerated residual below which the search ends"
+        0.1, "fraction of the tolerated residual below which the search ends"
     )
     heats: int = _bounds(
         4, "maximum number of fits of a free function until its prior converges"
@@ -286,7 +289,7 @@ class Policy:
         1.2, "ratio of rms residual to noise above which a caveat is added"
     )
     decoy: float = _shows(
-        0.5, "share of a function's gain that its decoy may reach without a caveat"
+        0.5, "fraction of a function's gain that its decoy may reach without a caveat"
     )
     tie: float = _shows(
         10.0,
@@ -307,7 +310,7 @@ class Policy:
     )
     nearby: float = _shows(
         0.03,
-        "distance within which data count as near a point, as a share of the range",
+        "distance within which data count as near a point, as a fraction of the range",
     )
     visited: float = _shows(
         0.1,

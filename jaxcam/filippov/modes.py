@@ -33,7 +33,7 @@ def surface_rates(
 
 
 def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
-    """Return the share of the upper field in sliding; it is between 0 and 1 if the
+    """Return the weight of the upper field in sliding; it is between 0 and 1 if the
     system slides.
     """
     above, below = surface_rates(system, t, state)

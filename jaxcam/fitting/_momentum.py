@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from ..recordings import ImpactTable
 
 
-# Limits of the momentum error, in standard errors and as a share of the exchanged
+# Limits of the momentum error, in standard errors and as a fraction of the exchanged
 # momentum
 _ERRORS, _SHARE = 3.0, 0.005
 

@@ -12,7 +12,7 @@ from ._axes import figure_of, legend_above, one_axes
 from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
 
 
-# share of white in the last curve of a family
+# fraction of white in the last curve of a family
 _LIGHTEST = 0.5
 # parts of a curve shorter than this (periods) are not labelled
 _NAMED = 0.04

@@ -64,7 +64,7 @@ def of_share(sentence: str) -> Callable[[float], None]:
 def of_branch(low: float, high: float) -> "Callable[[Point], None]":
     """Return the callback for a branch in the speed between bounds (rpm).
 
-    It reports the number of points and the share of the range that they span.
+    It reports the number of points and the fraction of the range that they span.
     """
     seen: list[float] = []
 

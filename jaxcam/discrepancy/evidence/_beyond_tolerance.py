@@ -21,7 +21,7 @@ class Beyond(NamedTuple):
     - `value`, `stderr`, `unit`: result of the fit; `low`, `high`: ends of the
       tolerance.
     - `excess`: distance beyond the nearer end, positive.
-    - `chance`: share of the bootstrap distribution beyond that end.
+    - `chance`: fraction of the bootstrap distribution beyond that end.
     """
 
     name: str

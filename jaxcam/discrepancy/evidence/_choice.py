@@ -42,9 +42,9 @@ class Choice:
     - `found`: the best subset; `best`: the named part of it; `before`: the fit
         without terms, with the rig parameters held within their tolerances.
     - `inclusion`, `deviation`: results of the bootstrap, by term and by parameter.
-    - `doubtful`: terms that were dropped, with the share of the bootstrap samples that
-        retain them; `needed`: those that are named nevertheless.
-    - `masked`: terms that were dropped, with their shares of the explained cost,
+    - `doubtful`: terms that were dropped, with the fraction of the bootstrap samples
+        that retain them; `needed`: those that are named nevertheless.
+    - `masked`: terms that were dropped, with their fractions of the explained cost,
         because the smoothed corner of another term may leave as much unexplained.
     - `beyond`: rig parameters that are outside their tolerances.
     - `missing`: unnamed functions that explain more than named terms;

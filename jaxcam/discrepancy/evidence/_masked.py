@@ -8,11 +8,11 @@ def unmasked(trials: Trials, best: Trial) -> tuple[Trial, list[tuple[str, float]
     explains.
 
     Dry friction jumps when the velocity changes sign. The jump is smoothed, and
-    integration steps do not end there, so a small share of the explained cost may
-    remain. With many samples this share is significant, and another term may represent
-    it.
+    integration steps do not end there, so a small fraction of the explained cost may
+    remain. With many samples this fraction is significant, and another term may
+    represent it.
 
-    **Returns:** the fit, and the dropped terms, each with its share of the explained
+    **Returns:** the fit, and the dropped terms, each with its fraction of the explained
     cost.
     """
     dropped: list[tuple[str, float]] = []

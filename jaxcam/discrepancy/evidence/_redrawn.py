@@ -21,8 +21,8 @@ def sure(
     Terms whose strengths might be zero are dropped first, then the term that the fewest
     bootstrap samples need.
 
-    **Returns:** the fit, its result of `redrawn`, and the dropped terms with the share
-    of the bootstrap samples that would have retained them.
+    **Returns:** the fit, its result of `redrawn`, and the dropped terms with the
+    fraction of the bootstrap samples that would have retained them.
     """
     doubtful: list[tuple[str, float]] = []
     while True:
@@ -54,7 +54,7 @@ class Needs(NamedTuple):
     """Whether the parts of a model are needed, in the bootstrap samples and in all
     data.
 
-    - `inclusion`: share of the bootstrap samples that would retain a part.
+    - `inclusion`: fraction of the bootstrap samples that would retain a part.
     - `deviation`: standard deviation of each free parameter over the bootstrap samples.
     - `lost`: loss in all data without a part, minus the penalty for its parameters.
     """
@@ -69,8 +69,8 @@ def redrawn(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Run the block bootstrap for the terms of a fit.
 
-    **Returns:** for each term, the share of the bootstrap samples that would retain it,
-    because a fit without it has a larger BIC; and the standard deviation of each
+    **Returns:** for each term, the fraction of the bootstrap samples that would retain
+    it, because a fit without it has a larger BIC; and the standard deviation of each
     parameter.
     """
     own = {

@@ -134,7 +134,7 @@ def _held_out(wave, variance) -> float:
 
 
 def _inclusion(wave, variance, asked: float, repetitions: int) -> float:
-    """Return the share of the bootstrap samples in which the ripple is significant."""
+    """Return the fraction of bootstrap samples in which the ripple is significant."""
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(wave), (repetitions, len(wave)))
     weight = 1 / variance[drawn]

@@ -15,8 +15,9 @@ class Rival(NamedTuple):
     """Functions and terms that were fitted in place of the chosen ones.
 
     - `worse`: score minus that of the choice.
-    - `share`: share of the bootstrap samples in which they would have been chosen. The
-      score corresponds to a BIC, so the share estimates their posterior probability.
+    - `share`: fraction of the bootstrap samples in which they would have been chosen.
+      The score corresponds to a BIC, so the fraction estimates their posterior
+      probability.
     """
 
     missing: Missing

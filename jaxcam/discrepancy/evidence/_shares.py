@@ -14,7 +14,7 @@ from ..policy import Policy
 class Shares(NamedTuple):
     """Shares of the misfit of the textbook model; their sum is one.
 
-    - `of`: the share of each named term or function, by label.
+    - `of`: the fraction of each named term or function, by label.
     - `left`: the unexplained share.
     """
 
@@ -57,7 +57,7 @@ def shares(
 
 
 def misfit_by_part(found: Fit, policy: Policy = Policy()) -> dict[str, float]:
-    """Return the shares of a misfit in flights, impacts and contacts, by name.
+    """Return the fractions of a misfit in flights, impacts and contacts, by name.
 
     The misfit of a part is its cost in excess of that of noise: one per sample, and one
     per component of a joint. The result is empty if no part has a significant misfit.

@@ -45,7 +45,7 @@ class VisitedStates(NamedTuple):
     ) -> Bool[np.ndarray, " k"]:
         """Return which points of a grid have enough data near them.
 
-        The minimum is a share `policy.visited` of the number for a uniform
+        The minimum is a fraction `policy.visited` of the number for a uniform
         distribution, and at least two values. Phase and time are always visited.
         """
         values = {

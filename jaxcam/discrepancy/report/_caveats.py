@@ -10,7 +10,7 @@ from ._words import listed, number, percent, quantity, ratio, spelled
 
 
 class Reason(enum.StrEnum):
-    """The reason for a caveat; equal to its name as a string."""
+    """The reason for a caveat, as a string."""
 
     SMALL_REMAINDER = "small remainder"
     IN_DOUBT = "in doubt"
@@ -208,7 +208,7 @@ def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
 
 
 def _against(trials: Trials, share: float) -> str:
-    """Return the evidence against a term that improves the fit in a share of the
+    """Return the evidence against a term that improves the fit in a fraction of the
     bootstrap samples.
     """
     if share >= trials.policy.sure:

@@ -16,7 +16,7 @@ from ._words import number, spelled
 
 
 class Verdict(enum.StrEnum):
-    """The verdict of a diagnosis; equal to its name as a string.
+    """The verdict of a diagnosis, as a string such as `"none"`.
 
     Examples:
         >>> from jaxcam.discrepancy import Verdict

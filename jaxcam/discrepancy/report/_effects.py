@@ -20,7 +20,7 @@ def term_effects(
 ) -> list[Effect]:
     """Return the named terms, in the order of their names.
 
-    **Arguments:** `share`: the share of the misfit that each of them explains.
+    **Arguments:** `share`: the fraction of the misfit that each of them explains.
     """
     best, blocks = choice.best, trials.blocks(choice.best)
     instead = {one.term: one.lost for one in choice.beyond if one.term}
@@ -172,7 +172,7 @@ def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
     """Return the unnamed effect of a residual structure.
 
     Args:
-        share: The unexplained share of the misfit.
+        share: The unexplained fraction of the misfit.
     """
     first, problem = choice.unexplained[0], trials.problem
     return Effect(

@@ -36,7 +36,7 @@ def ratio(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share as a percentage, without insignificant digits."""
+    """Return a fraction as a percentage, without insignificant digits."""
     if 0 < share < 0.01:
         return "less than 1 %"
     if 0.99 < share < 1:

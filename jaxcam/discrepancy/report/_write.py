@@ -104,8 +104,8 @@ def diagnosis_of(
 
 
 def _shares_of(trials: Trials, choice: Choice) -> Shares:
-    """Return the share of the misfit that each named term explains, and the unexplained
-    share.
+    """Return the fraction of the misfit that each named term explains, and the
+    unexplained fraction.
     """
     best, before = choice.best, choice.before
     instead = {one.term: one.lost for one in choice.beyond if one.term}

@@ -25,7 +25,7 @@ from ..terms import Term, watched, WithTerms
 
 
 # A step that worsens the fit of a recording is shortened by this factor, and abandoned
-# below this share of its length
+# below this fraction of its length
 _SHORTER, _SHORTEST = 0.25, 0.05
 
 

@@ -19,7 +19,8 @@ from ._roughness import occam, roughness
 from ._slots import filled, Free, Part
 
 
-# Change, as a share of the allowed step, below which element parameters have converged
+# Change, as a fraction of the allowed step, below which element parameters have
+# converged
 _SETTLED = 0.02
 
 
@@ -31,7 +32,7 @@ class Missing(NamedTuple):
     - `problem`: the problem with slots for the functions; that of `fit` contains their
       priors.
     - `decoys`: by label, the gain that was predicted for a function of the same family
-      acting in the reverse order of time, as a share of that of the function.
+      acting in the reverse order of time, as a fraction of that of the function.
     """
 
     functions: tuple[Part, ...]

@@ -131,7 +131,7 @@ class FreeSearch:
         return self._with(self.problem, bare, lead)
 
     def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
-        """Return the labels of functions, and the shares that their decoys gain."""
+        """Return the labels of functions, and the fractions that their decoys gain."""
         labels = {one.label for one in found.functions}
         return tuple(
             (lead.label, lead.decoy)

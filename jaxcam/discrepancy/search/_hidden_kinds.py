@@ -73,8 +73,8 @@ class Kind:
     ]
 
     def reach(self, number: Number, values: Sequence[float]) -> float:
-        """Return the largest change of a parameter in one fit: a share of the width of
-        a resonance.
+        """Return the largest change of a parameter in one fit: a fraction of the width
+        of a resonance.
         """
         if self is RESONANCE and number.name == "frequency":
             return number.reach * values[1]

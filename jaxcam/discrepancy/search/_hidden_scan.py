@@ -30,7 +30,8 @@ from ._vibration_scan import scanned_frequencies
 _RATIOS = (0.02, 0.1)
 # Ratio of adjacent time constants of a relaxation
 _TIMES = 1.25
-# Limits of a hysteresis, as shares of the range of positions, and its other parameters
+# Limits of a hysteresis, as fractions of the range of positions, and its other
+# parameters
 _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
 # The same for a stiffening hysteresis

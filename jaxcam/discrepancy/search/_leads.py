@@ -25,7 +25,7 @@ class Lead(NamedTuple):
     """One more function or term, with its predicted gain.
 
     `decoy` is the gain of a function of the same family that acts in the reverse order
-    of time, as a share of the gain; `None` if it was not computed.
+    of time, as a fraction of the gain; `None` if it was not computed.
     """
 
     gain: float

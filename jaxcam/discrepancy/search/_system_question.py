@@ -33,7 +33,7 @@ from ._question import (
 )
 
 
-# Slip speed as a share of the usual change of speed per step, so that the impulse of
+# Slip speed as a fraction of the usual change of speed per step, so that the impulse of
 # dry friction is integrated accurately enough
 _RESOLVED = 0.3
 

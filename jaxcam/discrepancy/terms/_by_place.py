@@ -9,7 +9,7 @@ from ._scaled import ScaledTerm
 from ._term import Motion, strength
 
 
-# Stribeck speeds to try, as shares of the highest speed
+# Stribeck speeds to try, as fractions of the highest speed
 _SHARES = tuple(np.geomspace(0.02, 0.6, 9).tolist())
 
 

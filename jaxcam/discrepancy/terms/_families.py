@@ -20,13 +20,13 @@ from ._shapes import Variable
 from ._where import Where
 
 
-# The domain of the sines extends beyond the data by this share at either end, because
-# all sines vanish at its ends
+# The domain of the sines extends beyond the data by this fraction at either end,
+# because all sines vanish at its ends
 _MARGIN = 0.15
 
 
 class Factor(enum.StrEnum):
-    """The factor of a free function; equal to its name as a string."""
+    """The factor of a free function, as a string such as `"velocity"`."""
 
     ONE = "one"
     VELOCITY = "velocity"
@@ -116,7 +116,8 @@ class Family:
     def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
         """Return the variances of the coefficients of a function of variance one.
 
-        `length`: correlation length, as a share of the range (in radians for a phase).
+        `length`: correlation length, as a fraction of the range (in radians for a
+        phase).
         """
         rates = np.asarray(self.waves(count)[0])
         unit = 1.0 if self.periodic else self.high - self.low

@@ -24,7 +24,7 @@ from ._where import Where
 # Knots of the spline that represents a function: two per edge of a form, which is
 # smoothed over a hundredth of the range
 _KNOTS = 332
-# The spline continues beyond either end by this share of the range
+# The spline continues beyond either end by this fraction of the range
 _BEYOND = 0.15
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
 """Arguments, in the order of the weights that select them."""

@@ -9,7 +9,7 @@ from ._term import Motion, strength
 from ._where import Where
 
 
-# Lower limit of the approach speed, as a share of the highest speed
+# Lower limit of the approach speed, as a fraction of the highest speed
 _SLOWEST = 1e-3
 
 

@@ -1,6 +1,6 @@
 """Parametric forms that may replace a free function.
 
-A form is a function of a phase, or of `u`, the argument as a share of the range
+A form is a function of a phase, or of `u`, the argument as a fraction of the range
 visited; its first parameter is its size. Edges are smoothed over a hundredth of the
 range, so that a fit can move them.
 """
@@ -12,7 +12,8 @@ import numpy as np
 
 
 _EDGE = 0.01
-# Smallest argument of a power, as a share of the range, so that its derivatives exist
+# Smallest argument of a power, as a fraction of the range, so that its derivatives
+# exist
 _LEAST = 1e-6
 
 
@@ -47,8 +48,8 @@ class Primitive(NamedTuple):
     - `jump`: half the jump of the form at a change of sign of the velocity, in units of
       its size.
     - `odd`: whether the form is multiplied by the direction of motion.
-    - `places`: the parameters that are positions, as shares of the range; if there are
-      two, the first is the lower one.
+    - `places`: the parameters that are positions, as fractions of the range; if there
+      are two, the first is the lower one.
     - `positive`: the parameters that are lengths or exponents.
     - `ends`: further positions, as a function of the parameters.
     """

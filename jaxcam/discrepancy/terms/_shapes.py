@@ -24,7 +24,7 @@ _END = 1 - 1e-12
 
 
 class Variable(enum.StrEnum):
-    """An argument of a free function; equal to its name as a string."""
+    """An argument of a free function, as a string such as `"position"`."""
 
     POSITION = "position"
     VELOCITY = "velocity"

@@ -11,9 +11,9 @@ from ._scaled import ScaledTerm
 from ._term import Motion, strength
 
 
-# Positions of a knee or an edge to try, as shares of the range visited
+# Positions of a knee or an edge to try, as fractions of the range visited
 _SHARES = tuple(np.linspace(0.02, 0.98, 33).tolist())
-# Depth over which the dry friction of a stop sets in, as a share of half the range
+# Depth over which the dry friction of a stop sets in, as a fraction of half the range
 _BEGINS = 0.02
 
 

@@ -24,7 +24,8 @@ _FEW = 24
 _FAR = 9.0
 # Damped steps from each start
 _STEPS = 12
-# The iteration ends after this many steps that reduce no cost by more than this share
+# The iteration ends after this many steps that reduce no cost by more than this
+# fraction
 _QUIET, _LITTLE = 3, 1e-3
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-9
 

@@ -158,8 +158,8 @@ class PublishedFit:
         """Return the combinations of parameters that are determined more by the priors
         than by the data.
 
-        There is one sentence for each, the weakest first; `share` is the share of the
-        information that must come from the data.
+        There is one sentence for each, the weakest first; `share` is the fraction of
+        the information that must come from the data.
         """
         sentences = []
         for part, direction in zip(self.shares, self.directions, strict=True):

@@ -44,8 +44,8 @@ def sides_after(
 ) -> Sides:
     """Return the sides after a step to the time `t`, and the state `x` there.
 
-    A crossing changes the side. Sliding ends on the side of which the share has reached
-    one; or, after a jump of the state, on the side on which the state is then.
+    A crossing changes the side. Sliding ends on the side of which the weight has
+    reached one; or, after a jump of the state, on the side on which the state is then.
     """
     negative, sliding = list(carried.negative), list(carried.sliding)
     across = hit[functions.m :]

@@ -202,7 +202,7 @@ class Functions:
         return tuple(rows[0]), [tuple(row) for row in rows[1:]]
 
     def shares(self, t, x, mode) -> tuple:
-        """Return the shares of the branches beyond the surfaces on which it slides."""
+        """Return the weights of the branches beyond the surfaces on which it slides."""
         return tuple(self._shares(t, _pack(x), *self._side(mode)))
 
     def heights(self, t, x, extents, mode):

@@ -93,7 +93,7 @@ def error_allowed(scale, before, after, tolerance, absolute) -> tuple:
     rounding.
 
     **Arguments:** scales, states at both ends, the relative tolerance, and the absolute
-    error requested for each component, or `None` for a share of the scale.
+    error requested for each component, or `None` for a fraction of the scale.
     """
     sizes = [
         jnp.maximum(jnp.abs(a), jnp.abs(b)) for a, b in zip(before, after, strict=True)

@@ -3,17 +3,17 @@
 After an impact with small rebound speed u the normal motion is y'' = A + B t + C y',
 where A < 0 is the normal acceleration of the state without normal velocity, B its rate
 of change along the sticking motion, and C the derivative of the normal acceleration
-with respect to the normal velocity. With restitution r0 + r1 v, the infinitely
-many remaining flights last
+with respect to the normal velocity. With restitution r0 + r1 v, the infinitely many
+remaining flights last
 
     T = 2 u (1 + r1 u / (1 - r0^2)) / (|A| (1 - r0))
         - (4/3) B u^2 / (A^3 (1 - r0)^2) + (2/3) C u^2 / (A^2 (1 - r0)^2) + O(u^3).
 
 For C = r1 = 0, this is the expansion behind eq. (3.17) of the thesis, carried to second
 order; the small parameter is lambda / (1 - r0), with lambda = u |j| / A^2 and j the
-jerk. The rest of
-the state follows the sticking field from the state P, from which the normal velocity
-has been removed in the direction of the impulse; this is accurate to the same order.
+jerk. The rest of the state follows the sticking field from the state P, from which the
+normal velocity has been removed in the direction of the impulse; this is accurate to
+the same order.
 """
 
 from typing import NamedTuple

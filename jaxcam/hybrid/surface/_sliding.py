@@ -32,7 +32,7 @@ from ._rounding import gap_rounding, rounding_of
 from ._switches import OnSides, surfaces
 
 
-# a surface is held by a contact if the contact forces undo this share of the change
+# a surface is held by a contact if the contact forces undo this fraction of the change
 # that its sides make
 _UNDONE = 1e-12
 
@@ -127,7 +127,7 @@ def slide_terms(mode: InMode, t, x) -> SlideTerms:
 
 
 def shares(mode: InMode, terms: SlideTerms) -> Float[Array, " K"]:
-    """Return the share b of the branch beyond each surface, zero if it does not
+    """Return the weight b of the branch beyond each surface, zero if it does not
     slide.
     """
     return solve_masked(terms.gains, -terms.slopes, _slides_on(mode) & terms.firm)
@@ -143,7 +143,7 @@ def field_in_mode(mode: InMode, t, x, contact: Bool[Array, " m"]) -> State:
 def multipliers_in_mode(mode: InMode, t, x, contact: Bool[Array, " m"]):
     """Return the multipliers of the constraints, as `contact_multipliers`.
 
-    Like the field, they are those of the branch and the shares of their changes.
+    Like the field, they are those of the branch and the weights of their changes.
     """
     if not mode.slidable:
         return contact_multipliers(mode, t, x, contact)
@@ -157,7 +157,7 @@ def multipliers_in_mode(mode: InMode, t, x, contact: Bool[Array, " m"]):
 
 
 def _combined(mode: InMode, terms: SlideTerms) -> State:
-    """Return the field of the branch and the shares of its changes."""
+    """Return the field of the branch and the weights of its changes."""
     parts, found = list(terms.field), shares(mode, terms)
     for kick, share, k in zip(terms.kicks, found, mode.slidable, strict=True):
         # contact forces pass a change on to other components
@@ -201,7 +201,7 @@ def distances(mode: InMode, t, x) -> Float[Array, " k"]:
 
 
 def beyond_shares(mode: InMode, t, x) -> Float[Array, " k"]:
-    """Return the share of the branch beyond each surface, shape `(k,)`; zero where the
+    """Return the weight of the branch beyond each surface, shape `(k,)`; zero where the
     motion does not slide.
     """
     found = list(shares(mode, slide_terms(mode, t, x)))

@@ -64,7 +64,7 @@ def basins_target(title: str, picture: Picture, note: str = "") -> Target:
             own = [name for name in found.names if name.split(" ")[0] == label]
             rows.append((f"attractors {label}", 1, len(own), ""))
         for name, share in found.shares.items():
-            rows.append((f"share of the states: {name}", np.nan, share.share, ""))
+            rows.append((f"fraction of the states: {name}", np.nan, share.share, ""))
         return rows
 
     def draw(system: CamFollower, size: str) -> Figure:

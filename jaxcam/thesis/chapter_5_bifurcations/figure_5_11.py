@@ -50,7 +50,7 @@ def compute(system: CamFollower, size: str) -> Rows:
         ("first speed without P(inf,1)", 152.67, first, "rpm"),
         ("interruption", INTERRUPTION, exact, "rpm"),
         (
-            "share of the speeds above it with a periodic motion",
+            "fraction of the speeds above it with a periodic motion",
             np.nan,
             np.mean(repeats),
             "",

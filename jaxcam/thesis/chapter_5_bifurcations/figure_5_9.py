@@ -76,7 +76,7 @@ def compute(system: CamFollower) -> Rows:
     for k, (rpm, printed) in enumerate(zip(each, (1, np.nan, np.nan), strict=True)):
         share = np.mean(samples.rests[k] > 0)
         rows.append(
-            (f"{rpm:g} rpm: share of the turns with sticking", printed, share, "")
+            (f"{rpm:g} rpm: fraction of the turns with sticking", printed, share, "")
         )
         phase = made.dataset["phase"].values[k, 0]
         spread = len(np.unique(np.round(phase[np.isfinite(phase)], 6)))

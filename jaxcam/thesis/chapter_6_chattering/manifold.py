@@ -79,7 +79,12 @@ def manifold_rows(system: CamFollower, branches: int) -> Rows:
         number = np.count_nonzero(np.isfinite(np.asarray(before.speed[k])))
         share = number / before.speed.shape[1]
         rows.append(
-            (f"share of the grazing points reached from S^{k + 1}", np.nan, share, "")
+            (
+                f"fraction of the grazing points reached from S^{k + 1}",
+                np.nan,
+                share,
+                "",
+            )
         )
     return rows
 
