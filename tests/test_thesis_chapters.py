@@ -160,7 +160,7 @@ def test_onset_and_sticking_time(calibrated):
 def test_two_attractors_at_145_rpm_in_their_basins(calibrated):
     table = found("figure-5.14", calibrated)
     assert list(table["difference"].dropna()) == [0.0, 0.0]
-    assert table["computed"].filter(like="share of").sum() == pytest.approx(1.0)
+    assert table["computed"].filter(like="fraction of").sum() == pytest.approx(1.0)
 
 
 @pytest.mark.slow
