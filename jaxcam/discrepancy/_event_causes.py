@@ -64,7 +64,7 @@ def event_causes(
         observed: Observed speeds of detachment (valve float), of the fold and the flip
             of P(1,1), and of the interruption of chatter (rad/s); NaN for a speed that
             was not observed.
-        errors: Standard error of each speed.
+        errors: Standard error of each speed (rad/s).
         terms: Candidate terms, each with one strength.
         where: Selects the parameter of the rig that is fitted together with each term,
             such as `lambda rig: rig.restitution.intercept`.

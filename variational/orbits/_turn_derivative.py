@@ -34,8 +34,8 @@ class TurnDerivative(eqx.Module):
     determinant: Float[Array, ""]
     """Determinant of `state`; zero if the motion sticks."""
     condition: Float[Array, ""]
-    """Relative error of `state` per relative error in each flight and saltation
-    matrix.
+    """Relative error of `state` per relative error in each flight and saltation matrix;
+    NaN for the method "flow".
     """
     sticks: bool = eqx.field(static=True)
     """Whether there is sustained contact, which removes all memory of the past."""
