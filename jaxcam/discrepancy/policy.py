@@ -128,8 +128,7 @@ class Policy:
         4, "sections per recording in that test; the worst one is ignored"
     )
     velocity_tail: float = _decides(
-        0.005,
-        "fraction of the velocities beyond each end of a velocity function's range",
+        0.005, "fraction of velocities beyond each end of a velocity function's range"
     )
     drive_wander: float = _decides(
         0.75,
@@ -175,8 +174,7 @@ class Policy:
         50.0, "difference in BIC up to which a subset is extended further"
     )
     helped: float = _bounds(
-        0.7,
-        "maximum fraction of the cost that a term may leave for the search to go on",
+        0.7, "maximum fraction of the cost left by a term for the search to go on"
     )
     clear: float = _bounds(
         10.0,
@@ -199,8 +197,7 @@ class Policy:
         4, "minimum number of step attempts during these steps"
     )
     crawl_gain: float = _bounds(
-        0.01,
-        "fraction of the remaining cost below which the gain in these steps is slow",
+        0.01, "fraction of the remaining cost below which these steps are slow"
     )
     late: int = _bounds(
         8, "attempts after which a fit must be better than the subset it extends"
