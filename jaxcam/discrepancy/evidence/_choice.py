@@ -15,12 +15,17 @@ from ..search import (
 )
 from ..terms import families
 from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
+from ._differing import Differing, differing
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
 from ._redrawn import Needs, needs, redrawn, sure
 from ._rivals import Rival, rivals
 from ._structure import Structure, structures
 from ._visited_states import visited_states
+
+
+# Share of the gain of separate values above which a common function may explain as much
+_AS_MUCH = 0.9
 
 
 class Outside(NamedTuple):
@@ -50,6 +55,8 @@ class Choice:
     - `missing`: unnamed functions that explain more than named terms;
         `needs`: their bootstrap results, by label; `rivals`: other functions that were
         fitted in their place.
+    - `differing`: a parameter with separate values in the recordings, which explain
+        most of the residual of the chosen fit.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -68,6 +75,7 @@ class Choice:
     missing: Missing | None = None
     needs: Needs | None = None
     rivals: tuple[Rival, ...] = ()
+    differing: Differing | None = None
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -105,15 +113,20 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     inclusion |= {one.term: one.parameter.chance for one in beyond if one.term}
     missing, needed_parts, others = None, None, ()
     left = [one for one in left_after if one.significant]
-    if left and trials.policy.functions:
+    different = differing(best.fit, trials.policy)
+    if left and trials.policy.functions and not _settled(different, left):
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed
         )
+    if missing is not None and different is not None:
+        if different.complete and different.bic < missing.score:
+            missing, needed_parts, others = None, None, ()
     after = best.fit if missing is None else missing.fit
     if after is not before.fit:
         # the parameters of the textbook model are within their tolerances
         before = dataclasses.replace(before, fit=_bounded(trials, before.fit, after))
     if missing is not None:
+        different = differing(missing.fit, trials.policy)
         nameless = Trial(
             missing.names | {"functions"}, missing.fit, missing.score, 0, False
         )
@@ -135,7 +148,17 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         missing,
         needed_parts,
         others,
+        different,
     )
+
+
+def _settled(different: Differing | None, left: list[Structure]) -> bool:
+    """Return whether separate values of a parameter leave only noise, and no function
+    common to the recordings promises as much.
+    """
+    if different is None or not different.complete:
+        return False
+    return max(one.gain for one in left) < _AS_MUCH * different.gained
 
 
 def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:

@@ -4,9 +4,13 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, HeldOut, Outside, Rival, rms_of
+from ..evidence import Choice, Differing, HeldOut, Outside, Rival, rms_of
 from ..search import Question, Trial, Trials
 from ._words import listed, number, percent, quantity, ratio, spelled
+
+
+# Number of recordings up to which their values are listed
+_LISTED = 6
 
 
 class Reason(enum.StrEnum):
@@ -20,6 +24,7 @@ class Reason(enum.StrEnum):
     TIE = "tie"
     DECOY = "a decoy explains much"
     NOT_SHARED = "not shared by the records"
+    DIFFERING = "a parameter differs"
     POOR_PREDICTION = "poor prediction"
     ABOVE_NOISE = "above the noise"
     BEYOND_TOLERANCE = "beyond tolerance"
@@ -72,9 +77,31 @@ def caveats_of(
             f"({apart[0].sentence}). Its cause is not common to the recordings; check "
             "how they were made.",
         )
+    if choice.differing is not None:
+        yield differs(choice.differing)
     held = choice.held
     if held.after > trials.policy.as_noise:
         yield above_noise(held, named)
+
+
+def differs(found: Differing) -> Caveat:
+    """Caveat: a parameter differs from recording to recording."""
+    values, unit = found.values, found.unit
+    if len(values) <= _LISTED:
+        said = ", ".join(
+            f"{name} {number(value, stderr, unit)}"
+            for name, value, stderr in zip(found.records, values, found.stderr)
+        )
+    else:
+        said = f"from {min(values):.4g} to {quantity(f'{max(values):.4g}', unit)}"
+    return Caveat(
+        Reason.DIFFERING,
+        f"The recordings differ: a separate {spelled(found.name)} for each of them "
+        f"({said}) explains {percent(found.share)} of the squared residual above the "
+        f"noise and leaves {ratio(found.left)} times the noise. What this parameter "
+        "represents has changed between the recordings.",
+        (found.name,),
+    )
 
 
 def noisier_than_stated(question: Question) -> Iterator[Caveat]:

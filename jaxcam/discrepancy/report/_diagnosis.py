@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from ...fitting import Fit, Model, Residuals
 from ...hybrid import HybridSystem
 from ...tables import ShortTable
-from ..evidence import Ripple, Structure
+from ..evidence import Differing, Ripple, Structure
 from ..policy import Policy
 from ..terms import FreeFunction, Value, Where, WithHidden, WithTerms
 from ._caveats import Caveat
@@ -157,6 +157,10 @@ class Diagnosis:
     """Shares of the misfit of the textbook model in `"flight"`, at an `"impact"` and in
     `"contact"`; empty if the misfit is noise.
     """
+    differing: Differing | None = None
+    """A parameter with separate values in the recordings, which explain most of the
+    residual of the chosen model; `differing.fit` is the fit with them.
+    """
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -256,5 +260,6 @@ class Diagnosis:
                 name: {"value": one.value, "stderr": one.stderr}
                 for name, one in self.rig.items()
             },
+            "differing": None if self.differing is None else self.differing.to_json(),
             "summary": self.summary,
         }

@@ -53,11 +53,23 @@ def summary_of(
     what = effects[0]
     acts = f"it acts like {what.sentence}, {what.region}."
     explained = sum(effect.share or 0.0 for effect in named)
+    acts += _difference(choice)
     if not explained:
         return f"The missing effect is none of the known ones: {acts}"
     return (
         f"{percent(explained)} of the misfit is explained by {' and '.join(parts)}. "
         f"The rest ({percent(1 - explained)}) is none of the known effects: {acts}"
+    )
+
+
+def _difference(choice: Choice) -> str:
+    """Return a sentence about a parameter that differs between the recordings."""
+    found = choice.differing
+    if found is None:
+        return ""
+    return (
+        f" A separate {spelled(found.name)} for each recording explains "
+        f"{percent(found.share)} of the squared residual above the noise."
     )
 
 
@@ -105,7 +117,7 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
             "No missing physics common to the recordings was detected. However, they "
             "are not explained down to the sensor noise: the residual is "
             f"{ratio(fitted)} times the noise and differs from recording to "
-            f"recording.{tail}"
+            f"recording.{_difference(choice)}{tail}"
         )
     if unseen > policy.as_noise:
         tail = (

@@ -28,6 +28,7 @@ from ._caveats import (
     Caveat,
     caveats_of,
     decoy_explains,
+    differs,
     functions_fall_short,
     functions_tie,
     noisier_than_stated,
@@ -100,6 +101,7 @@ def diagnosis_of(
         tuple(caveats),
         policy,
         misfit=misfit_by_part(choice.before.fit, policy),
+        differing=choice.differing,
     )
 
 
@@ -166,6 +168,7 @@ def _of_functions(
         policy,
         functions,
         misfit_by_part(bare.fit, policy),
+        choice.differing,
     )
 
 
@@ -180,6 +183,8 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     share = max((share for _, share in missing.decoys), default=0.0)
     if share > policy.decoy:
         yield decoy_explains(share)
+    if choice.differing is not None:
+        yield differs(choice.differing)
     if left > policy.as_noise:
         yield functions_fall_short(left)
     elif held.after > policy.as_noise:

@@ -1,0 +1,87 @@
+"""A parameter that differs from recording to recording; truth from closed forms."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcam import HybridSystem
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.evidence._differing import differing
+from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
+from jaxcam.recordings import Recording, segment
+
+
+NOISE = 1e-4
+TIME = 1e-3 * np.arange(2500)
+STIFFNESS, DAMPING = 150.0, 0.3
+
+
+class Swing(HybridSystem):
+    """A damped oscillator, far from any stop."""
+
+    stiffness: float = 149.0
+    damping: float = 0.2
+
+    def vector_field(self, t, state):
+        force = self.stiffness * state[0] + self.damping * state[1]
+        return jnp.stack([state[1], -force])
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state * jnp.array([1.0, -0.5])
+
+
+def _free(x0, damping):
+    """A damped oscillation that starts at rest."""
+    w = np.sqrt(STIFFNESS - damping**2 / 4)
+    decay = np.exp(-damping * TIME / 2)
+    return x0 * decay * (np.cos(w * TIME) + damping / (2 * w) * np.sin(w * TIME))
+
+
+def _fitted(motions):
+    rng = np.random.default_rng(4)
+    parts = []
+    for number, motion in enumerate(motions):
+        noisy = motion + NOISE * rng.standard_normal(len(motion))
+        run = Recording(f"run{number}", TIME, {"angle_rad": noisy})
+        parts.append(segment(run, "angle_rad", noise=NOISE))
+    model = Model(Swing(), {"angle_rad": Sensor(0, noise=NOISE)})
+    parameters = [
+        Parameter("stiffness", lambda m: m.system.stiffness, 3.0, unit="1/s^2"),
+        Parameter("damping", lambda m: m.system.damping, 0.2, unit="1/s"),
+    ]
+    return fit(Problem.build(model, parts, parameters))
+
+
+def test_the_parameter_that_differs_is_found():
+    """The damping of each recording, within four standard errors; noise remains."""
+    true = np.array([0.30, 0.32, 0.29, 0.35])
+    found = differing(_fitted([_free(0.1, c) for c in true]), Policy())
+    assert found is not None
+    assert found.name == "damping" and found.unit == "1/s"
+    assert np.all(np.abs(found.values - true) < 4 * found.stderr)
+    assert np.all(found.stderr < 0.002)
+    assert found.complete and found.share > 0.99
+    assert abs(found.left - 1) < 0.03
+    assert found.to_json()["values"]["run3"][0] == pytest.approx(found.values[3])
+
+
+def test_equal_recordings_do_not_differ():
+    assert differing(_fitted([_free(x, DAMPING) for x in (0.1, 0.2)]), Policy()) is None
+
+
+def test_one_recording_does_not_differ():
+    """Even with a residual: its first second lacks a tenth of the damping."""
+    motion = np.where(TIME < 1, _free(0.1, 0.9 * DAMPING), _free(0.1, DAMPING))
+    assert differing(_fitted([motion]), Policy()) is None
+
+
+def test_a_force_common_to_the_recordings_is_no_difference():
+    """A force that acts from one second on in every recording."""
+    settled = 0.002 * (1 - np.cos(np.sqrt(STIFFNESS) * (TIME - 1))) * (TIME > 1)
+    found = differing(
+        _fitted([_free(x, DAMPING) + settled for x in (0.1, 0.1)]), Policy()
+    )
+    assert found is None
