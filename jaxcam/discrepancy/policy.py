@@ -91,11 +91,6 @@ class Policy:
         "velocity may leave; next to a friction term, a term that explains less is not "
         "named",
     )
-    differs: float = _decides(
-        0.5,
-        "minimum share of the squared residual above the noise that separate values of "
-        "one parameter in each recording must explain",
-    )
     near: float = _decides(
         4.0, "cost per sample below which an unconverged fit counts as near the data"
     )

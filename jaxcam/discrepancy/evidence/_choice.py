@@ -114,7 +114,16 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     missing, needed_parts, others = None, None, ()
     left = [one for one in left_after if one.significant]
     different = differing(best.fit, trials.policy)
-    if left and trials.policy.functions and not _settled(different, left):
+    settled = _settled(different, left, best.bic)
+    if left and best.names and not settled:
+        without = differing(before.fit, trials.policy)
+        if _settled(without, left_before, best.bic):
+            # the terms only imitated the differences
+            different, settled = without, True
+            best, left_after, held = before, left_before, None
+            inclusion, deviation = redrawn(trials, best, seed)
+            doubtful, needed, beyond = [], [], []
+    if left and trials.policy.functions and not settled:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed
         )
@@ -152,13 +161,14 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     )
 
 
-def _settled(different: Differing | None, left: list[Structure]) -> bool:
-    """Return whether separate values of a parameter leave only noise, and no function
-    common to the recordings promises as much.
+def _settled(different: Differing | None, left: list[Structure], bic: float) -> bool:
+    """Return whether separate values of a parameter leave only noise, have a smaller
+    BIC than the named terms, and no function common to the recordings promises as much.
     """
-    if different is None or not different.complete:
+    if different is None or not different.complete or different.bic >= bic:
         return False
-    return max(one.gain for one in left) < _AS_MUCH * different.gained
+    common = [one.gain for one in left if one.significant]
+    return max(common, default=0.0) < _AS_MUCH * different.gained
 
 
 def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:

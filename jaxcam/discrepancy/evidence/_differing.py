@@ -16,6 +16,8 @@ from ._held_out import rms_of
 
 # Number of parameters that are fitted with separate values, those of largest gain
 _FITTED = 3
+# Minimum share of the squared residual above the noise that they must explain
+_LEAST = 0.5
 
 
 class Differing(NamedTuple):
@@ -70,7 +72,7 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
     half of each recording must improve the prediction of the other half.
 
     **Returns:** `None` if nothing remains above the noise, if there is one recording
-    only, or if no separate values explain at least `policy.differs` of it.
+    only, or if no separate values explain at least half of it.
     """
     problem, samples = found.problem, found.problem.samples
     shared = [n for n in found.free if not problem.parameter(n).per_record]
@@ -88,7 +90,7 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
         if gains[name] > least and _foretold(halves, name) > 0
     ]
     best = max(tried, key=lambda one: one.share, default=None)
-    return best if best is not None and best.share >= policy.differs else None
+    return best if best is not None and best.share >= _LEAST else None
 
 
 def _separated(found: Fit, name: str, policy: Policy) -> Differing:
