@@ -53,6 +53,9 @@ def summary_of(
     what = effects[0]
     acts = f"it acts like {what.sentence}, {what.region}."
     explained = sum(effect.share or 0.0 for effect in named)
+    difference = choice.differing
+    if difference is not None and difference.complete and not named:
+        return _difference(choice).strip()
     acts += _difference(choice)
     if not explained:
         return f"The missing effect is none of the known ones: {acts}"
@@ -67,6 +70,13 @@ def _difference(choice: Choice) -> str:
     found = choice.differing
     if found is None:
         return ""
+    if found.complete:
+        low, high = min(found.values), max(found.values)
+        return (
+            f" The {spelled(found.name)} differs from recording to recording, from "
+            f"{low:.4g} to {quantity(f'{high:.4g}', found.unit)}: with a separate value "
+            f"for each, the residual is {ratio(found.left)} times the noise."
+        )
     return (
         f" A separate {spelled(found.name)} for each recording explains "
         f"{percent(found.share)} of the squared residual above the noise."
