@@ -73,9 +73,9 @@ def _difference(choice: Choice) -> str:
     if found.complete:
         low, high = min(found.values), max(found.values)
         return (
-            f" The {spelled(found.name)} differs from recording to recording, from "
-            f"{low:.4g} to {quantity(f'{high:.4g}', found.unit)}: with a separate value "
-            f"for each, the residual is {ratio(found.left)} times the noise."
+            f" The {spelled(found.name)} differs between the recordings, from "
+            f"{low:.4g} to {quantity(f'{high:.4g}', found.unit)}; with separate "
+            f"values, the residual is {ratio(found.left)} times the noise."
         )
     return (
         f" A separate {spelled(found.name)} for each recording explains "
