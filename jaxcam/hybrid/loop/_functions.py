@@ -21,10 +21,12 @@ from ..surface import (
     free_jet,
     gap_rounding,
     gaps,
+    has_friction,
     heights_rounded,
     impacts,
     InMode,
     joint_rest,
+    least_compliance,
     lie_series,
     mode_jet,
     normal_acceleration,
@@ -83,6 +85,8 @@ class Functions:
             jumps = jumping_components(system, shapes, time, state, k)
         # surfaces on which a motion can slide
         self.slidable = [number for number, changed in enumerate(jumps) if changed]
+        # whether contacts have friction
+        self.rubs = m > 0 and has_friction(system)
         self._parameters = jax.tree.map(split, parameters)
         self._memory: dict | None = None
 
@@ -130,6 +134,8 @@ class Functions:
         self._lift = bind(_lift, time, state)
         self._speed_blur = bind(speed_rounding, time, state, state)
         self._chatter = bind(completion_coefficients, time, state, state)
+        if self.rubs:
+            self._compliance = bind(least_compliance, time, state)
         if m > 1:
             self._joint_rest = bind(joint_rest, time, state, flags)
 
@@ -270,6 +276,10 @@ class Functions:
         flags = _pack(touching)
         state, found = self._joint_rest(t, _pack(x), flags, *self._side(mode))
         return tuple(state), tuple(found)
+
+    def compliance(self, t, x, mode):
+        """Return the `least_compliance` of the contacts, only for contact friction."""
+        return self._compliance(t, _pack(x), *self._side(mode))[()]
 
     def onto(self, frame: Frame, jets, x, mode):
         """Take one Newton step of the state towards gap = normal velocity = 0."""

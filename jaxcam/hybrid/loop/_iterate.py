@@ -18,6 +18,7 @@ from ._crossing import of_constraints, refreshed
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
+from ._jam import Jam, jam_of_step, jams_after
 from ._landing import land, Landing
 from ._loop_state import LoopState
 from ._release import judge_contact, lets_go_before
@@ -85,11 +86,13 @@ def _iterate(
     ]
     converged = ~sticking | ~any_of([~n for n in near])
     held = _judge_contacts(carried, end, landing, judged)
-    reached = held.lands & judged.good & ~lands & converged
+    jam = jam_of_step(functions, plan, carried, end, made)
+    reached = held.lands & judged.good & ~lands & converged & ~jam.near
     locates = reached & ~carried.locating & plan.exact_release
     released = reached & ~locates
     good = judged.good & ~locates
-    good = good & ~(held.retake & sticking & ~lands) & converged
+    good = good & ~(held.retake & sticking & ~lands & ~jam.near) & converged
+    good = good & ~jam.retake
 
     # the state and the jets to continue with
     delay = jnp.where(reached, held.offset, 0.0)
@@ -130,7 +133,7 @@ def _iterate(
         good=good,
         fits=made.effort <= 1.0,
         finite=finite,
-        shorter=_shorter(functions, end, judged, held, converged),
+        shorter=_shorter(functions, end, judged, held, converged, jam),
         # algebraic contact can start its next attempt from here
         guess=left if functions.planar else carried.x,
         settling=~converged & functions.planar,
@@ -141,6 +144,7 @@ def _iterate(
         loses=landing.loses,
         strikes=landing.strikes,
         stuck=landing.stuck,
+        jams=active & jams_after(functions, jam, good, begins, landing.seen, x, mode),
         stale=_stale(carried, landing, released),
         begins=begins,
         locates=locates,
@@ -260,11 +264,15 @@ def _judge_contacts(
     )
 
 
-def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converged):
+def _shorter(
+    functions, end: StepEnd, judged: Judged, held: StepVerdict, converged, jam: Jam
+):
     """Return the step length to try next if the step is not accepted."""
     shorter = jnp.minimum(judged.flown.length, held.length)
     to_impact = jnp.minimum(shorter, end.length + judged.flown.offset)
     shorter = jnp.where(judged.over, to_impact, shorter)
+    if functions.rubs:
+        shorter = jnp.minimum(shorter, jam.length)
     if functions.planar:
         return shorter
     return jnp.where(converged, shorter, 0.5 * end.length)

@@ -9,6 +9,7 @@ from ._chatter import (
     completion_coefficients as completion_coefficients,
     completion_time as completion_time,
 )
+from ._compliance import least_compliance as least_compliance
 from ._contact_friction import has_friction as has_friction
 from ._impact_law import (
     check_restitution as check_restitution,
