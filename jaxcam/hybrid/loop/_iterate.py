@@ -90,9 +90,8 @@ def _iterate(
     reached = held.lands & judged.good & ~lands & converged & ~jam.near
     locates = reached & ~carried.locating & plan.exact_release
     released = reached & ~locates
-    good = judged.good & ~locates
+    good = judged.good & ~locates & ~jam.retake
     good = good & ~(held.retake & sticking & ~lands & ~jam.near) & converged
-    good = good & ~jam.retake
 
     # the state and the jets to continue with
     delay = jnp.where(reached, held.offset, 0.0)

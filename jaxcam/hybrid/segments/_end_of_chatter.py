@@ -33,12 +33,18 @@ class Rest(NamedTuple):
 
 
 def end_of_chatter(
-    motion: CompiledMotion, rebound: Rebound, depth: float, tiny, longest
+    motion: CompiledMotion,
+    rebound: Rebound,
+    depth: float,
+    tiny,
+    longest,
+    several: bool = False,
 ) -> Rest | None:
     """Return the rest at the end of the impacts, if they may be completed now.
 
     **Arguments:** the relative rebound speed at which a chatter is completed (`depth`);
-    the resolution of each gap (`tiny`); and the longest step (s).
+    the resolution of each gap (`tiny`); the longest step (s); and whether `several`
+    constraints are hit at once, for which there is no formula.
     """
     before, after = (float(speeds[rebound.hit]) for speeds in rebound.speeds)
     after = max(after, 0.0)
@@ -46,7 +52,7 @@ def end_of_chatter(
         rest = _joint_end(motion, rebound, after / -before, tiny, longest)
         if rest is not None:
             return rest
-    if after > depth * rebound.fastest:
+    if several or after > depth * rebound.fastest:
         return None
     t, k, contact = rebound.time, rebound.hit, rebound.contact.copy()
     end = motion.completion(t, rebound.state, contact, k, after, -before)

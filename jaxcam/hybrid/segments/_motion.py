@@ -20,6 +20,7 @@ from ..surface import (
     gap_rounding,
     gaps,
     impacts,
+    impacts_together,
     joint_rest,
     least_gaps,
     lie_derivative,
@@ -258,6 +259,11 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def impact(self, t, x):
         return impacts(self.system, t, x)
+
+    @_compiled
+    def impacts_together(self, t, x, closed):
+        """Return the state after the impacts at the `closed` constraints."""
+        return impacts_together(self.system, t, x, closed)
 
     @_compiled
     def joint_rest(self, t, x, touching):

@@ -19,6 +19,10 @@ from ._impacts import (
     impacts as impacts,
     restitution_coefficients as restitution_coefficients,
 )
+from ._impacts_together import (
+    impacts_together as impacts_together,
+    may_hit_together as may_hit_together,
+)
 from ._joint_rest import (
     joint_rest as joint_rest,
     LOSSY_RATIO as LOSSY_RATIO,
