@@ -198,6 +198,21 @@ def test_a_bar_on_different_feet_turns(pair, swapped):
     np.testing.assert_allclose(run.impacts.after[0], expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("pair", [(0.6, 0.6), (0.3, 0.3), (0.8, 0.3), (0.9, 0.0)])
+def test_a_bar_comes_to_rest_on_both_feet(pair):
+    """With equal coefficients, after the time T (1 + e) / (1 - e), to 1e-6."""
+    run = jaxcam.simulate(_bar(*pair), DROPPED, 0.0, 8 * FALL)
+    assert run.successful, run.result
+    np.testing.assert_allclose(run.final, np.zeros(4), atol=1e-15)
+    assert sorted(np.asarray(run.contacts.constraint)[-2:]) == [0, 1]
+    e = pair[0]
+    if pair == (e, e):
+        times = run.contacts.start
+        np.testing.assert_allclose(times, [FALL * (1 + e) / (1 - e)] * 2, atol=1e-6)
+    energy = 9.81 * run.steps.state[:, 0] + run.steps.state[:, 2:] ** 2 @ [0.5, 1 / 6]
+    assert np.max(energy) < 9.81 * 0.5 * (1 + 1e-12)
+
+
 def test_a_bar_that_lands_nearly_flat_has_two_impacts():
     """One foot after the other, at gaps far above rounding."""
     start = np.array([0.5, 1e-6, 0.0, 0.0])

@@ -80,7 +80,7 @@ class Functions:
         self.slidable = [number for number, changed in enumerate(jumps) if changed]
         # whether contacts have friction; whether impacts may coincide
         self.rubs = m > 0 and has_friction(system)
-        self.joins = may_hit_together(system, m)
+        self.joins = may_hit_together(system, n, m)
         self._parameters = jax.tree.map(split, parameters)
         self._memory: dict | None = None
 

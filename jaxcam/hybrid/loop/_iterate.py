@@ -80,11 +80,7 @@ def _iterate(
 
     # contact: the state is moved onto the surface a second time, then checked
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
-    near = [
-        jnp.abs(a - b) <= 1e-7 * (jnp.abs(a) + w)
-        for a, b, w in zip(settled, landing.x, made.scale, strict=True)
-    ]
-    converged = ~sticking | ~any_of([~n for n in near])
+    converged = ~sticking | _settles(functions, carried, made, landing, settled)
     held = _judge_contacts(carried, end, landing, judged)
     jam = jam_of_step(functions, plan, carried, end, made)
     reached = held.lands & judged.good & ~lands & converged & ~jam.near
@@ -165,6 +161,23 @@ def _iterate(
         mode=mode,
     )
     return after_attempt(plan, carried, attempt), record
+
+
+def _settles(functions: Functions, carried, made: Step, landing: Landing, settled):
+    """Return whether moving the state onto the surface once more hardly changes it."""
+    floors: list[Any] = [0.0] * functions.n
+    if functions.m > 1:
+        # a component that has never moved, as the angle of a body that lands flat, has
+        # no scale
+        for k, blur in enumerate(carried.blur[: functions.m]):
+            ways = zip(made.frame.lift[k], made.frame.push[k], strict=True)
+            moves = [jnp.abs(a) + jnp.abs(b) / carried.longest for a, b in ways]
+            floors = [f + blur * m for f, m in zip(floors, moves, strict=True)]
+    far = [
+        jnp.abs(a - b) > 1e-7 * (jnp.abs(a) + w) + floor
+        for a, b, w, floor in zip(settled, landing.x, made.scale, floors, strict=True)
+    ]
+    return ~any_of(far)
 
 
 def _suppressed(carried: LoopState, judged: Judged) -> tuple:

@@ -66,7 +66,7 @@ def rest_of_chatter(
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
     possible = possible & (a < 0) & (at_end < 0) & soon
     contact = closed(mode, functions.m, len(jets))
-    jump = jnp.where(possible, rebound - approach, 1.0)
+    jump = jnp.where(possible & (rebound > approach), rebound - approach, 1.0)
     for k, jet in enumerate(jets if len(jets) > 1 else ()):
         # no other gap closes in the meantime; over such a short time, it is a parabola
         # whose acceleration includes the mean force of the remaining impacts
@@ -74,7 +74,11 @@ def rest_of_chatter(
         strongest = jnp.minimum(jet.acceleration, mean)
         left = jet.gap + duration * (jet.velocity + duration * strongest / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
-        if k >= functions.m:
+        if k < functions.m:
+            # a body that leaves, and still does so at the end
+            rises = jet.velocity + duration * strongest > 0
+            clear = clear | (rises & (jet.gap >= -rounding[k]))
+        else:
             # a slip that friction has stopped
             clear = clear | (jet.gap <= rounding[k])
         possible = possible & clear

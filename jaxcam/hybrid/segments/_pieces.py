@@ -241,7 +241,7 @@ class _Engine:
 
     def _after_impact(self, k, t, before):
         """Return whether several constraints are hit at once, and the state then."""
-        if may_hit_together(self.motion.system, len(self.contact)):
+        if may_hit_together(self.motion.system, len(before), len(self.contact)):
             gaps = np.asarray(self.motion.jets(t, before))[:, 0]
             speeds = np.asarray(self.motion.velocity(t, before))
             slow = np.asarray(self.motion.rounding(t, before, np.abs(before)))[1]

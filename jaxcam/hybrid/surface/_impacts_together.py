@@ -35,9 +35,16 @@ MOST_TOGETHER = 4
 _UNCOUPLED = 1e-12
 
 
-def may_hit_together(system: HybridSystem, number: int) -> bool:
-    """Return whether impacts of a system with `number` constraints may coincide."""
-    return 1 < number <= MOST_TOGETHER and not has_friction(system)
+def may_hit_together(system: HybridSystem, states: int, number: int) -> bool:
+    """Return whether impacts may be applied together.
+
+    A body with one direction of motion, that is, up to three states (with a phase),
+    cannot approach different constraints.
+
+    **Arguments:** the system, its number of states, and its number of constraints.
+    """
+    few = 1 < number <= MOST_TOGETHER
+    return few and states > 3 and not has_friction(system)
 
 
 def impacts_together(
