@@ -209,7 +209,8 @@ def test_a_bar_comes_to_rest_on_both_feet(pair):
     if pair == (e, e):
         times = run.contacts.start
         np.testing.assert_allclose(times, [FALL * (1 + e) / (1 - e)] * 2, atol=1e-6)
-    energy = 9.81 * run.steps.state[:, 0] + run.steps.state[:, 2:] ** 2 @ [0.5, 1 / 6]
+    states = np.asarray(run.steps.state)
+    energy = 9.81 * states[:, 0] + states[:, 2:] ** 2 @ np.array([1 / 2, 1 / 6])
     assert np.max(energy) < 9.81 * 0.5 * (1 + 1e-12)
 
 

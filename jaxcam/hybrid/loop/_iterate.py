@@ -25,6 +25,7 @@ from ._release import judge_contact, lets_go_before
 from ._row_kind import kind_of_switch, row_kind
 from ._select import any_of, of_constraint, select
 from ._series import off_rounding, taylor_of_release
+from ._settles import settles
 from ._step import end_of_step, make_step, Step, StepEnd
 
 
@@ -80,7 +81,7 @@ def _iterate(
 
     # contact: the state is moved onto the surface a second time, then checked
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
-    converged = ~sticking | _settles(functions, carried, made, landing, settled)
+    converged = ~sticking | settles(functions, carried, made, landing, settled)
     held = _judge_contacts(carried, end, landing, judged)
     jam = jam_of_step(functions, plan, carried, end, made)
     reached = held.lands & judged.good & ~lands & converged & ~jam.near
@@ -161,23 +162,6 @@ def _iterate(
         mode=mode,
     )
     return after_attempt(plan, carried, attempt), record
-
-
-def _settles(functions: Functions, carried, made: Step, landing: Landing, settled):
-    """Return whether moving the state onto the surface once more hardly changes it."""
-    floors: list[Any] = [0.0] * functions.n
-    if functions.m > 1:
-        # a component that has never moved, as the angle of a body that lands flat, has
-        # no scale
-        for k, blur in enumerate(carried.blur[: functions.m]):
-            ways = zip(made.frame.lift[k], made.frame.push[k], strict=True)
-            moves = [jnp.abs(a) + jnp.abs(b) / carried.longest for a, b in ways]
-            floors = [f + blur * m for f, m in zip(floors, moves, strict=True)]
-    far = [
-        jnp.abs(a - b) > 1e-7 * (jnp.abs(a) + w) + floor
-        for a, b, w, floor in zip(settled, landing.x, made.scale, floors, strict=True)
-    ]
-    return ~any_of(far)
 
 
 def _suppressed(carried: LoopState, judged: Judged) -> tuple:
