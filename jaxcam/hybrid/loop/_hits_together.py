@@ -41,7 +41,7 @@ def hits_together(
         speed = jet.velocity + offset * (jet.acceleration + offset * jet.jerk / 2)
         third = jet.acceleration / 2 + offset * jet.jerk / 6
         gap = jet.gap + offset * (jet.velocity + offset * third)
-        near = jnp.abs(gap) <= 2e-12 * carried.sizes[k] + carried.blur[k]
+        near = jnp.abs(gap) <= 1e-14 * carried.sizes[k] + 10 * carried.blur[k]
         also = strikes & near & ~carried.contact[k] & (speed < -500 * slow[k])
         several = several | (also & ~hit[k])
         closed.append(near | carried.contact[k] | hit[k])
