@@ -17,7 +17,7 @@ from ._system import HybridSystem
 from ._types import RealScalar
 from ._untraced import prepare, run_untraced
 from .checks import check_start, is_traced
-from .codes import RUNNING
+from .codes import PAINLEVE, RUNNING
 from .loop import Log, LoopState, run, run_reversible
 from .lowering import whole
 from .record import (
@@ -220,7 +220,8 @@ def _of_rows(runner, system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, True)
     mode = jnp.stack(carried.mode)
     # an invalid start is not integrated
-    state = jnp.where(carried.status == RUNNING, state, jnp.nan)
+    valid = (carried.status == RUNNING) | (carried.status == PAINLEVE)
+    state = jnp.where(valid, state, jnp.nan)
     carried, log = runner(functions, plan, carried, rows)
     return assemble(system, t0, state, mode, log, (rows, rows)), _code(carried)
 

@@ -79,6 +79,13 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
         "hysteresis."
     )
     """Crossings of a switching surface accumulate."""
+    painleve = (
+        "Friction makes the contact force ambiguous or impossible (a Painlevé "
+        "configuration): while the body slips, pressing it against the constraint "
+        "does not push it away. Choose a smaller friction coefficient, or model the "
+        "contact as a compliant force in the vector field."
+    )
+    """Friction makes a contact force ambiguous or impossible."""
 
 
 _ITEMS = (
@@ -90,6 +97,7 @@ _ITEMS = (
     RESULTS.backward,
     RESULTS.together,
     RESULTS.accumulates,
+    RESULTS.painleve,
 )
 (
     FINISHED,
@@ -100,6 +108,7 @@ _ITEMS = (
     BACKWARD,
     TOGETHER,
     ACCUMULATES,
+    PAINLEVE,
 ) = map(float, range(len(_ITEMS)))
 """Codes: the index of each item above. The status of a batch element is one of them."""
 

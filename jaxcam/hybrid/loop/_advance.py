@@ -6,7 +6,15 @@ import jax
 import jax.numpy as jnp
 
 from ..breakpoints import declared
-from ..codes import ACCUMULATES, FINISHED, NOT_FINITE, RUNNING, STEP_FAILED, TOGETHER
+from ..codes import (
+    ACCUMULATES,
+    FINISHED,
+    NOT_FINITE,
+    PAINLEVE,
+    RUNNING,
+    STEP_FAILED,
+    TOGETHER,
+)
 from ..runge_kutta import Tableau, tableau_of
 from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
 from ._loop_state import closed, LoopState
@@ -137,6 +145,8 @@ class Attempt(NamedTuple):
     # a constraint is hit; or the motion cannot leave the surface that it has reached
     strikes: Any
     stuck: Any
+    # friction makes a contact force ambiguous at the end of the step
+    jams: Any
     # as in `LoopState`
     stale: tuple
     # a flight hidden by rounding; whether an impact loses energy
@@ -316,5 +326,6 @@ def _status(plan, carried, attempt, failures, crowded):
         just = ~bad & (failures > _PATIENCE) & (carried.t - carried.crossed[0] <= room)
         stuck = attempt.good & attempt.stuck
         status = jnp.where(just | stuck, ACCUMULATES, status)
+    status = jnp.where(attempt.jams, PAINLEVE, status)
     status = jnp.where(reached, FINISHED, status)
     return jnp.where(carried.status == RUNNING, status, carried.status)

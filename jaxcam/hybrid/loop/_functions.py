@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -21,11 +20,15 @@ from ..surface import (
     free_jet,
     gap_rounding,
     gaps,
+    has_friction,
     heights_rounded,
     impacts,
+    impacts_together,
     InMode,
     joint_rest,
+    least_compliance,
     lie_series,
+    may_hit_together,
     mode_jet,
     normal_acceleration,
     normal_directions,
@@ -38,17 +41,9 @@ from ..surface import (
     switched_jet,
     switched_rounding,
 )
+from ._frame import Frame, frame_of, lift_of
 from ._gap_polynomial import Jet
 from ._jumps import jumping_components
-
-
-class Frame(NamedTuple):
-    """Directions used to move a state back onto the surface; see `Functions.onto`."""
-
-    lift: tuple
-    push: tuple
-    lift_velocity: tuple
-    damping: tuple
 
 
 class Functions:
@@ -83,6 +78,9 @@ class Functions:
             jumps = jumping_components(system, shapes, time, state, k)
         # surfaces on which a motion can slide
         self.slidable = [number for number, changed in enumerate(jumps) if changed]
+        # whether contacts have friction; whether impacts may coincide
+        self.rubs = m > 0 and has_friction(system)
+        self.joins = may_hit_together(system, n, m)
         self._parameters = jax.tree.map(split, parameters)
         self._memory: dict | None = None
 
@@ -126,10 +124,14 @@ class Functions:
             return
         self._impact = bind(impacts, time, state)
         self._velocity = bind(normal_velocity, time, state)
-        self._frame = bind(_frame, time, state)
-        self._lift = bind(_lift, time, state)
+        self._frame = bind(frame_of, time, state)
+        self._lift = bind(lift_of, time, state)
         self._speed_blur = bind(speed_rounding, time, state, state)
         self._chatter = bind(completion_coefficients, time, state, state)
+        if self.rubs:
+            self._compliance = bind(least_compliance, time, state)
+        if self.joins:
+            self._together = bind(impacts_together, time, state, flags)
         if m > 1:
             self._joint_rest = bind(joint_rest, time, state, flags)
 
@@ -187,6 +189,10 @@ class Functions:
         if self.k:
             rows += [tuple(row) for row in self._resets(t, _pack(x), *side)]
         return rows
+
+    def impacts_together(self, t, x, closed, mode) -> tuple:
+        """Return the state after the impacts at the `closed` constraints."""
+        return tuple(self._together(t, _pack(x), _pack(closed), *self._side(mode)))
 
     def sides(self, t, x) -> tuple:
         """Return for each surface whether a start is on its negative side."""
@@ -271,6 +277,10 @@ class Functions:
         state, found = self._joint_rest(t, _pack(x), flags, *self._side(mode))
         return tuple(state), tuple(found)
 
+    def compliance(self, t, x, mode):
+        """Return the `least_compliance` of the contacts, only for contact friction."""
+        return self._compliance(t, _pack(x), *self._side(mode))[()]
+
     def onto(self, frame: Frame, jets, x, mode):
         """Take one Newton step of the state towards gap = normal velocity = 0."""
         for k in range(self.m):
@@ -335,19 +345,3 @@ def _free_taylor(system, t, x, contact):
 
 def _mode_taylor(field, system, t, x, contact):
     return _taylor_of(lambda s, y: field(system, s, y, contact), t, x)
-
-
-def _frame(system, t, x):
-    """Return the directions E (unit gap) and D (unit velocity), v_x E, and C = a_x
-    D.
-    """
-    slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
-    curve = jax.jacfwd(lambda y: normal_acceleration(system, t, y))(x)
-    push = normal_directions(system, t, x)
-    lift = _lift(system, t, x)
-    return lift, push, jnp.sum(slope * lift, axis=1), jnp.sum(curve * push, axis=1)
-
-
-def _lift(system, t, x):
-    gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
-    return gradient / jnp.sum(gradient * gradient, axis=1)[:, None]

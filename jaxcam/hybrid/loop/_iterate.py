@@ -18,12 +18,14 @@ from ._crossing import of_constraints, refreshed
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
+from ._jam import Jam, jam_of_step, jams_after
 from ._landing import land, Landing
 from ._loop_state import LoopState
 from ._release import judge_contact, lets_go_before
 from ._row_kind import kind_of_switch, row_kind
 from ._select import any_of, of_constraint, select
 from ._series import off_rounding, taylor_of_release
+from ._settles import settles
 from ._step import end_of_step, make_step, Step, StepEnd
 
 
@@ -79,17 +81,14 @@ def _iterate(
 
     # contact: the state is moved onto the surface a second time, then checked
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
-    near = [
-        jnp.abs(a - b) <= 1e-7 * (jnp.abs(a) + w)
-        for a, b, w in zip(settled, landing.x, made.scale, strict=True)
-    ]
-    converged = ~sticking | ~any_of([~n for n in near])
+    converged = ~sticking | settles(functions, carried, made, landing, settled)
     held = _judge_contacts(carried, end, landing, judged)
-    reached = held.lands & judged.good & ~lands & converged
+    jam = jam_of_step(functions, plan, carried, end, made)
+    reached = held.lands & judged.good & ~lands & converged & ~jam.near
     locates = reached & ~carried.locating & plan.exact_release
     released = reached & ~locates
-    good = judged.good & ~locates
-    good = good & ~(held.retake & sticking & ~lands) & converged
+    good = judged.good & ~locates & ~jam.retake
+    good = good & ~(held.retake & sticking & ~lands & ~jam.near) & converged
 
     # the state and the jets to continue with
     delay = jnp.where(reached, held.offset, 0.0)
@@ -130,7 +129,7 @@ def _iterate(
         good=good,
         fits=made.effort <= 1.0,
         finite=finite,
-        shorter=_shorter(functions, end, judged, held, converged),
+        shorter=_shorter(functions, end, judged, held, converged, jam),
         # algebraic contact can start its next attempt from here
         guess=left if functions.planar else carried.x,
         settling=~converged & functions.planar,
@@ -141,6 +140,7 @@ def _iterate(
         loses=landing.loses,
         strikes=landing.strikes,
         stuck=landing.stuck,
+        jams=active & jams_after(functions, jam, good, begins, landing.seen, x, mode),
         stale=_stale(carried, landing, released),
         begins=begins,
         locates=locates,
@@ -260,11 +260,15 @@ def _judge_contacts(
     )
 
 
-def _shorter(functions, end: StepEnd, judged: Judged, held: StepVerdict, converged):
+def _shorter(
+    functions, end: StepEnd, judged: Judged, held: StepVerdict, converged, jam: Jam
+):
     """Return the step length to try next if the step is not accepted."""
     shorter = jnp.minimum(judged.flown.length, held.length)
     to_impact = jnp.minimum(shorter, end.length + judged.flown.offset)
     shorter = jnp.where(judged.over, to_impact, shorter)
+    if functions.rubs:
+        shorter = jnp.minimum(shorter, jam.length)
     if functions.planar:
         return shorter
     return jnp.where(converged, shorter, 0.5 * end.length)

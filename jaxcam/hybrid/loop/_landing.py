@@ -8,6 +8,7 @@ from ._advance import Plan
 from ._crossing import past_surfaces, sides_after
 from ._flight import StepVerdict
 from ._functions import Functions
+from ._hits_together import hits_together
 from ._loop_state import LoopState
 from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
 from ._rest_together import loses_energy, rest_together
@@ -72,21 +73,20 @@ def land(
     after = after_each[0]
     for k in range(1, len(after_each)):
         after = select(flown.constraint == k, after_each[k], after)
+    number = functions.m + functions.k
+    hit = [lands & (flown.constraint == k) for k in range(number)]
+    strikes = any_of(hit[: functions.m]) if functions.k else lands
+    several, after, hit = hits_together(
+        functions, carried, hit, made.jets, offset, seen, landed, after
+    )
     speeds = [
         j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in made.jets
     ]
     approach = of_constraint(speeds, flown.constraint)
     x = select(lands, after, made.x)
     mode = _kept_contacts(functions, carried, lands, seen, landed, x)
-    number = functions.m + functions.k
-
-    def reached():
-        return [lands & (flown.constraint == k) for k in range(number)]
-
-    strikes, slides, leaves, stuck = lands, no, no, no
+    slides, leaves, stuck = no, no, no
     if functions.k:
-        hit = reached()
-        strikes = any_of(hit[: functions.m])
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
         mode = mode + sides.negative + sides.sliding
         jets = functions.jets(seen, x, mode)
@@ -97,7 +97,6 @@ def land(
         mode = mode[:number] + tuple(a | b for a, b in flags)
     else:
         jets = functions.jets(seen, x, mode)
-        hit = reached()
 
     # do the remaining impacts take negligible time?
     rebound = jnp.maximum(
@@ -105,7 +104,7 @@ def land(
     )
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
-    impact = Impact(t, landed, after, approach, rebound, flown.constraint)
+    impact = Impact(t, landed, after, approach, rebound, flown.constraint, several)
     parts = carried, end, impact, speeds, jets, mode, hit, fastest, rounding
     ending = _ending(functions, plan, *parts)
     hidden = _hides(carried, impact, jets, rounding)

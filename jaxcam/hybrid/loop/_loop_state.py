@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ..codes import ACCUMULATES, RUNNING
+from ..codes import ACCUMULATES, PAINLEVE, RUNNING
 from ..surface import forced_time, start_room
 from ._functions import Functions
 from ._gap_polynomial import Jet
@@ -132,7 +132,7 @@ def first_state(
     if crossings:
         status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
     origin, extents = first_extents(lifts, jets, tinies, x)
-    contact, settled = [], []
+    contact, settled, touched = [], [], []
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
         gap, velocity = jet.gap, jet.velocity
         near = jnp.abs(gap) <= tiny
@@ -140,6 +140,7 @@ def first_state(
         hop = tiny * jnp.abs(jet.acceleration)
         low = (jet.acceleration < 0) & (velocity * velocity <= hop)
         touching = near & ((jnp.abs(velocity) <= slow) | low)
+        touched.append(touching)
         contact.append(touching & _presses(jet, tiny) & (status == RUNNING))
         # off the surface, the start is unchanged; on it, rounding is removed
         behind = near & (gap < 0)
@@ -161,6 +162,9 @@ def first_state(
     settled += crossings
     first = jnp.where(held, longest, first_step(extents, rates, t0, longest))
     x = select(status == RUNNING, x, (jnp.nan,) * len(x))
+    if functions.rubs:
+        least = functions.compliance(t0, x, (*touched, *sides))
+        status = jnp.where((status == RUNNING) & (least <= 0), PAINLEVE, status)
     one = jnp.ones_like(t0)
     return LoopState(
         t=t0,

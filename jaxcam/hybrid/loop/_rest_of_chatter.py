@@ -29,6 +29,8 @@ class Impact(NamedTuple):
     approach: Any
     rebound: Any
     constraint: Any
+    # whether it is an impact on several constraints at once
+    several: Any
 
 
 def rest_of_chatter(
@@ -40,7 +42,7 @@ def rest_of_chatter(
     `mode` then, the time (s) of the next `stop` of the run, and the `rounding` of each
     gap and switching function.
     """
-    t, before, after, approach, rebound, constraint = impact
+    t, before, after, approach, rebound, constraint, several = impact
     dampings, restitutions, states = functions.chatter(t, before, after, mode)
     damping = of_constraint(dampings, constraint)
     r0 = of_constraint(restitutions, constraint)
@@ -50,7 +52,8 @@ def rest_of_chatter(
     a = of_constraint([j.acceleration for j in jets], constraint)
     j = of_constraint([j.jerk for j in jets], constraint)
     small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
-    possible = (a < 0) & small & (r0 < 1)
+    # the formula is for the impacts on one constraint
+    possible = (a < 0) & small & (r0 < 1) & ~several
     # quantities of the state without normal velocity
     a = jnp.where(possible, a - damping * rebound, -1.0)
     rate = j - damping * a
@@ -63,7 +66,7 @@ def rest_of_chatter(
     soon = (t + duration <= stop) | (duration <= 1e-13 * jnp.abs(t))
     possible = possible & (a < 0) & (at_end < 0) & soon
     contact = closed(mode, functions.m, len(jets))
-    jump = jnp.where(possible, rebound - approach, 1.0)
+    jump = jnp.where(possible & (rebound > approach), rebound - approach, 1.0)
     for k, jet in enumerate(jets if len(jets) > 1 else ()):
         # no other gap closes in the meantime; over such a short time, it is a parabola
         # whose acceleration includes the mean force of the remaining impacts
@@ -71,7 +74,11 @@ def rest_of_chatter(
         strongest = jnp.minimum(jet.acceleration, mean)
         left = jet.gap + duration * (jet.velocity + duration * strongest / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
-        if k >= functions.m:
+        if k < functions.m:
+            # a body that leaves, and still does so at the end
+            rises = jet.velocity + duration * strongest > 0
+            clear = clear | (rises & (jet.gap >= -rounding[k]))
+        else:
             # a slip that friction has stopped
             clear = clear | (jet.gap <= rounding[k])
         possible = possible & clear

@@ -10,7 +10,8 @@ from ..codes import RUNNING
 from ..runge_kutta import rates_among, step
 from ._advance import Plan
 from ._flight import moves_in
-from ._functions import Frame, Functions
+from ._frame import Frame
+from ._functions import Functions
 from ._loop_state import LoopState
 from ._scale import error_allowed, error_norm, held_scales, scales
 from ._select import any_of, select

@@ -33,12 +33,18 @@ class Rest(NamedTuple):
 
 
 def end_of_chatter(
-    motion: CompiledMotion, rebound: Rebound, depth: float, tiny, longest
+    motion: CompiledMotion,
+    rebound: Rebound,
+    depth: float,
+    tiny,
+    longest,
+    several: bool = False,
 ) -> Rest | None:
     """Return the rest at the end of the impacts, if they may be completed now.
 
     **Arguments:** the relative rebound speed at which a chatter is completed (`depth`);
-    the resolution of each gap (`tiny`); and the longest step (s).
+    the resolution of each gap (`tiny`); the longest step (s); and whether `several`
+    constraints are hit at once, for which there is no formula.
     """
     before, after = (float(speeds[rebound.hit]) for speeds in rebound.speeds)
     after = max(after, 0.0)
@@ -46,11 +52,13 @@ def end_of_chatter(
         rest = _joint_end(motion, rebound, after / -before, tiny, longest)
         if rest is not None:
             return rest
-    if after > depth * rebound.fastest:
+    if several or after > depth * rebound.fastest:
         return None
     t, k, contact = rebound.time, rebound.hit, rebound.contact.copy()
     end = motion.completion(t, rebound.state, contact, k, after, -before)
-    if not (bool(end.possible) and _stays_alone(motion, rebound, float(end.duration))):
+    if not (
+        bool(end.possible) and _stays_alone(motion, rebound, float(end.duration), tiny)
+    ):
         return None
     contact[k] = True
     return Rest(t + float(end.duration), np.asarray(end.state), contact)
@@ -83,7 +91,7 @@ def _joint_end(motion, rebound: Rebound, ratio, tiny, longest) -> Rest | None:
     return Rest(t, np.asarray(state), touching)
 
 
-def _stays_alone(motion, rebound: Rebound, length: float) -> bool:
+def _stays_alone(motion, rebound: Rebound, length: float, tiny) -> bool:
     """Return whether no other gap closes during a chatter of some `length` (s).
 
     Over such a short time a gap is a parabola, whose acceleration includes the mean
@@ -94,6 +102,8 @@ def _stays_alone(motion, rebound: Rebound, length: float) -> bool:
     jump = speeds[1] - speeds[0]
     mean = free - free[hit] * jump / jump[hit] if jump[hit] > 0 else free
     left = gap + length * (speed + length * np.minimum(free, mean) / 2)
-    clear = contact | (left > 0)
+    rises = speed + length * np.minimum(free, mean) > 0
+    # a body that leaves, and still does so at the end
+    clear = contact | (left > 0) | (rises & (gap >= -tiny))
     clear[hit] = True
     return bool(np.all(clear))

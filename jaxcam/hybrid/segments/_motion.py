@@ -1,7 +1,6 @@
 """Compile the functions used by the engine of `_pieces.py`."""
 
 import functools
-from typing import NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -20,6 +19,7 @@ from ..surface import (
     gap_rounding,
     gaps,
     impacts,
+    impacts_together,
     joint_rest,
     least_gaps,
     lie_derivative,
@@ -32,45 +32,13 @@ from ..surface import (
     start_room,
 )
 from ._one_step import one_step, scaled_term
+from ._points import ChatterEnd, Hop, PathPoint
 
 
 # attempted steps in one call of diffrax
 _BATCH = 64
 # points at which each of its steps is checked
 FRACTIONS = np.arange(1, 9) / 8
-
-
-class PathPoint(NamedTuple):
-    """An intermediate state, and for each constraint the distance from its event.
-
-    The level is the gap of an open constraint, and the pressure (minus the multiplier)
-    of a constraint in contact; the event is the point at which it falls through zero.
-    """
-
-    state: jax.Array
-    level: jax.Array
-    rate: jax.Array
-
-
-class Hop(NamedTuple):
-    """End of a short flight: a `PathPoint`, normal velocity, change in height, and
-    error.
-    """
-
-    state: jax.Array
-    level: jax.Array
-    rate: jax.Array
-    velocity: jax.Array
-    climbed: jax.Array
-    effort: jax.Array
-
-
-class ChatterEnd(NamedTuple):
-    """The end of a chatter sequence, and whether the series for it is valid."""
-
-    possible: jax.Array
-    duration: jax.Array
-    state: jax.Array
 
 
 @eqx.filter_jit
@@ -258,6 +226,11 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def impact(self, t, x):
         return impacts(self.system, t, x)
+
+    @_compiled
+    def impacts_together(self, t, x, closed):
+        """Return the state after the impacts at the `closed` constraints."""
+        return impacts_together(self.system, t, x, closed)
 
     @_compiled
     def joint_rest(self, t, x, touching):

@@ -18,6 +18,7 @@ import numpy as np
 from .. import breakpoints
 from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
+from ..surface import may_hit_together
 from ._end_of_chatter import end_of_chatter, Rebound, Rest
 from ._events import Flown, TOO_LONG
 from ._motion import CompiledMotion, prepared
@@ -213,7 +214,7 @@ class _Engine:
 
     def _impact(self, k, t, before):
         """Apply the impact law; complete the chatter if it is due."""
-        after = np.asarray(self.motion.impact(t, before))[k]
+        several, after = self._after_impact(k, t, before)
         speeds = [np.asarray(self.motion.velocity(t, x)) for x in (before, after)]
         self.fastest = max(self.fastest, float(speeds[1][k]))
         # an impact on one constraint may break contact with another
@@ -232,11 +233,26 @@ class _Engine:
             self.code = TOGETHER
         rebound = Rebound(t, after, k, self.contact, speeds, self.fastest)
         depth = float(self.settings.chatter_depth)
-        rest = end_of_chatter(self.motion, rebound, depth, tiny, self.longest)
+        rest = end_of_chatter(self.motion, rebound, depth, tiny, self.longest, several)
         if rest is not None and rest.time <= self.end:
             self._close(k, before, rest)
             return
         self._row(RowKind.IMPACT, k, t, after, before)
+
+    def _after_impact(self, k, t, before):
+        """Return whether several constraints are hit at once, and the state then."""
+        if may_hit_together(self.motion.system, len(before), len(self.contact)):
+            gaps = np.asarray(self.motion.jets(t, before))[:, 0]
+            speeds = np.asarray(self.motion.velocity(t, before))
+            slow = np.asarray(self.motion.rounding(t, before, np.abs(before)))[1]
+            closed = (np.abs(gaps) <= self._tiny(before[None])) | self.contact
+            closed[k] = True
+            approach = closed & ~self.contact & (speeds < -500 * slow)
+            approach[k] = True
+            if np.sum(approach) > 1:
+                joint = self.motion.impacts_together(t, before, closed)
+                return True, np.asarray(joint)
+        return False, np.asarray(self.motion.impact(t, before))[k]
 
     def _close(self, k, before, rest: Rest):
         """Log the last impact, on constraint `k`, and continue in contact."""

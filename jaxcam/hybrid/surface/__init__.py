@@ -9,6 +9,7 @@ from ._chatter import (
     completion_coefficients as completion_coefficients,
     completion_time as completion_time,
 )
+from ._compliance import least_compliance as least_compliance
 from ._contact_friction import has_friction as has_friction
 from ._impact_law import (
     check_restitution as check_restitution,
@@ -17,6 +18,10 @@ from ._impact_law import (
 from ._impacts import (
     impacts as impacts,
     restitution_coefficients as restitution_coefficients,
+)
+from ._impacts_together import (
+    impacts_together as impacts_together,
+    may_hit_together as may_hit_together,
 )
 from ._joint_rest import (
     joint_rest as joint_rest,

@@ -43,6 +43,25 @@ def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"
     return _with_friction(system, t, x, after)
 
 
+def frictionless_law(
+    system: HybridSystem, t: RealScalar, x: State
+) -> tuple[Float[Array, "m n"], Float[Array, " m"]]:
+    """Return the impulse directions and the coefficients of restitution at a state.
+
+    Args:
+        system: The system.
+        t: Time (s).
+        x: State just before an impact, shape `(n,)`.
+
+    Returns:
+        Unit directions, shape `(m, n)`, and coefficients, shape `(m,)`; friction is not
+            included. Those of a constraint that does not approach are the limits of
+            slow impacts.
+    """
+    after = jnp.atleast_2d(system.impact(t, x))
+    return _law(system, t, x, normal_velocity(system, t, x), after)
+
+
 def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
     """Return the coefficient of restitution of each constraint in the limit of slow
     impacts.
@@ -83,14 +102,29 @@ def _with_friction(
     """Add the impulses of friction to frictionless impacts, and change those in the
     normal direction accordingly.
     """
-    sides, limits = sides_of(system, t, x), normal_directions(system, t, x)
+    sides, kind = sides_of(system, t, x), restitution_kind(system)
     before = normal_velocity(system, t, x)
-    kind = restitution_kind(system)
+    directions, coefficients = _law(system, t, x, before, after)
     rows = []
+    for k, direction in enumerate(directions):
+        one = _one_contact(system, t, x, k, sides, direction)
+        found = impulses(
+            one.side, one.slip, before[k], coefficients[k], one.rates, kind
+        )
+        friction = found.positive * one.positive + found.negative * one.negative
+        rows.append(x + found.total * direction + friction)
+    return jnp.stack(rows)
+
+
+def _law(system, t, x, before, after):
+    """Return the directions and coefficients that frictionless impacts give.
+
+    At rest, they are limits.
+    """
+    limits = normal_directions(system, t, x)
+    directions, coefficients = [], []
     for k, row in enumerate(after):
         approach, rebound = before[k], normal_velocity(system, t, row)[k]
-        # direction and coefficient follow from the frictionless impact; at rest, they
-        # are limits
         moves = approach < 0
         impulse = jnp.where(moves, rebound - approach, 1.0)
         direction = jnp.where(moves, (row - x) / impulse, limits[k])
@@ -99,11 +133,9 @@ def _with_friction(
             -rebound / jnp.where(moves, approach, -1.0),
             _slow_coefficient(system, t, x, k, direction),
         )
-        one = _one_contact(system, t, x, k, sides, direction)
-        found = impulses(one.side, one.slip, approach, coefficient, one.rates, kind)
-        friction = found.positive * one.positive + found.negative * one.negative
-        rows.append(x + found.total * direction + friction)
-    return jnp.stack(rows)
+        directions.append(direction)
+        coefficients.append(coefficient)
+    return jnp.stack(directions), jnp.stack(coefficients)
 
 
 def _slow_coefficient(system, t, x, k: int, direction):

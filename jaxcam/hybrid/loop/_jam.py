@@ -1,0 +1,57 @@
+"""End a run where friction makes a contact force ambiguous or impossible."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from ._advance import Plan
+from ._functions import Functions
+from ._loop_state import LoopState
+from ._step import seen_from_inside, Step, StepEnd
+
+
+# compliance of a contact, relative to that without friction, up to which it counts as
+# zero
+_ZERO = 1e-9
+# fraction of the longest step below which a step is not repeated
+_TINY = 1e-12
+
+
+class Jam(NamedTuple):
+    """The outcome of a step for the compliance of the contacts."""
+
+    # whether it has fallen to zero at the end of the step
+    near: Any
+    # whether the step ends well beyond that, and a better length for it
+    retake: Any
+    length: Any
+
+
+def jam_of_step(
+    functions: Functions, plan: Plan, carried: LoopState, end: StepEnd, made: Step
+) -> Jam:
+    """Return whether the contacts lose their compliance in a step.
+
+    The contact force may have a pole there, so its zero is not its release.
+    """
+    h, no = end.length, jnp.asarray(False)
+    if not functions.rubs:
+        return Jam(no, no, jnp.full_like(h, jnp.inf))
+    seen = seen_from_inside(plan, end)(end.t)
+    least = functions.compliance(seen, made.x, carried.mode)
+    near = least <= _ZERO
+    beyond = least < -_ZERO
+    retake = beyond & (h > _TINY * carried.longest) & ~carried.completing
+    return Jam(near, retake, jnp.where(retake, 0.5 * h, jnp.inf))
+
+
+def jams_after(functions: Functions, jam: Jam, good, begins, t, x, mode):
+    """Return whether the motion cannot go on from the end of a `good` step.
+
+    It also examines the mode after an event. A chatter that `begins` to be completed
+    has not led to contact yet.
+    """
+    if not functions.rubs:
+        return jnp.asarray(False)
+    least = functions.compliance(t, x, mode)
+    return good & ~begins & (jam.near | (least <= 0))
