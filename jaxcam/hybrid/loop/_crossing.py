@@ -52,7 +52,7 @@ def sides_after(
     if not functions.slidable:
         flags = [a ^ b for a, b in zip(negative, across, strict=True)]
         return Sides(tuple(flags), tuple(sliding), [])
-    shares = functions.shares(t, made.x, carried.mode)
+    shares = functions.shares(t, made.raw, carried.mode)
     heights, blur = functions.heights(t, x, carried.extents, carried.mode)
     leaves = [jnp.asarray(False) for _ in negative]
     for k, crossed in enumerate(across):

@@ -10,14 +10,23 @@ import numpy as np
 
 from .._switched import SwitchedSystem
 from .._system import HybridSystem
-from ..lowering import joined, scalarise, split
+from ..lowering import (
+    joined,
+    Memory,
+    motion_series,
+    MotionSeries,
+    scalarise,
+    split,
+)
 from ..runge_kutta import rates_among
 from ..surface import (
+    along_path,
     beyond_shares,
     completion_coefficients,
+    field_and_distances,
+    field_and_distances_in_mode,
     field_in_force,
     field_in_mode,
-    free_jet,
     gap_rounding,
     gaps,
     has_friction,
@@ -26,24 +35,27 @@ from ..surface import (
     impacts_together,
     InMode,
     joint_rest,
+    Jumps,
     least_compliance,
-    lie_series,
     may_hit_together,
-    mode_jet,
-    normal_acceleration,
-    normal_directions,
+    motion_rates,
     normal_velocity,
+    open_surfaces,
     resets,
     settled,
     slack_of_hold,
     speed_rounding,
     surfaces,
-    switched_jet,
     switched_rounding,
 )
+from ._derived import free_taylor, planar_jet
 from ._frame import Frame, frame_of, lift_of
 from ._gap_polynomial import Jet
 from ._jumps import jumping_components
+
+
+# highest derivatives that a step uses, of each part of `Distances`
+_ORDERS = (3, 1, 3, 0)
 
 
 class Functions:
@@ -73,18 +85,18 @@ class Functions:
         self.n, self.m, self.k = n, m, k
         self.plain = plain
         self.planar = n == 2 and m == 1 and k == 0
-        jumps: tuple[tuple[int, ...], ...] = ()
+        jumps = Jumps()
         if isinstance(system, SwitchedSystem):
             jumps = jumping_components(system, shapes, time, state, k)
         # surfaces on which a motion can slide
-        self.slidable = [number for number, changed in enumerate(jumps) if changed]
+        self.slidable = [number for number, changed in enumerate(jumps.held) if changed]
         # whether contacts have friction; whether impacts may coincide
         self.rubs = m > 0 and has_friction(system)
         self.joins = may_hit_together(system, n, m)
         self._parameters = jax.tree.map(split, parameters)
-        self._memory: dict | None = None
+        self._memory: Memory | None = None
 
-        def bind(function, *example, whole_field=k == 0):
+        def bind(function, *example, whole_field=k == 0, series=False):
             if not whole_field:
                 function, example = in_mode(function, m, jumps), (*example, mode)
 
@@ -92,29 +104,34 @@ class Functions:
                 return function(eqx.combine(p, static), *arguments)
 
             if plain:
-                return joined(functools.partial(whole, parameters))
-            scalar = scalarise(whole, shapes, *example)
+                bound = functools.partial(whole, parameters)
+                return joined(functools.partial(_series, bound) if series else bound)
+            if series:
+                scalar = motion_series(whole, _ORDERS, shapes, *example)
+            else:
+                scalar = scalarise(whole, shapes, *example)
             return lambda *a: scalar(self._parameters, *a, memory=self._memory)
 
         if self.planar:
             self._field = bind(
                 lambda s, t, x, c: s.vector_field(t, x), time, state, flags
             )
-            self._jets = bind(_planar_jet, time, state, flags)
-            self._taylor = bind(_free_taylor, time, state, flags)
+            self._jets = bind(planar_jet, time, state, flags)
+            self._taylor = bind(free_taylor, time, state, flags)
         else:
+            # the mode of a switched system contains the contacts
+            held = () if k else (flags,)
             field = field_in_mode if k else field_in_force
-            self._field = bind(field, time, state, flags)
-            jets = switched_jet if k else mode_jet
-            self._jets = bind(jets, time, state, flags)
-            taylor = functools.partial(_mode_taylor, field)
-            self._taylor = bind(taylor, time, state, flags)
+            self._field = bind(field, time, state, *held)
+            both = field_and_distances_in_mode if k else field_and_distances
+            self._series = bind(both, time, state, *held, series=True)
         self._free = bind(lambda s, t, x: s.vector_field(t, x), time, state)
         blur = switched_rounding if k else gap_rounding
         self._blur = bind(blur, time, state, state)
         if k:
             self._resets = bind(resets, time, state)
             self._sides = bind(_negative, time, state, whole_field=True)
+            self._open = bind(open_surfaces, time, state)
         if self.slidable:
             self._settled = bind(settled, time, state)
             self._shares = bind(beyond_shares, time, state)
@@ -141,7 +158,7 @@ class Functions:
 
         All calls in the block must belong to one trace (no loop or branch inside).
         """
-        self._memory = {}
+        self._memory = Memory()
         try:
             yield
         finally:
@@ -151,12 +168,15 @@ class Functions:
         """Return a mode as arguments: none without surfaces."""
         return (_pack(mode),) if self.k else ()
 
+    def _held(self, mode) -> tuple:
+        """Return the mode, or only the contacts without surfaces, as an argument."""
+        return (_pack(mode if self.k else mode[: self.m]),)
+
     def field(self, t, x, mode):
         """Return the rate of change of the state in flight or, unless the system is
         planar, in contact.
         """
-        contact = _pack(mode[: self.m])
-        return tuple(self._field(t, _pack(x), contact, *self._side(mode)))
+        return tuple(self._field(t, _pack(x), *self._held(mode)))
 
     def pairs(self, t, x, mode) -> dict[int, int]:
         """Return which components of the state are rates of others: see
@@ -165,18 +185,46 @@ class Functions:
         return rates_among(x, tuple(self._free(t, _pack(x), *self._side(mode))))
 
     def jets(self, t, x, mode) -> list[Jet]:
-        """Return one jet for each constraint, then one for each surface."""
-        contact = _pack(mode[: self.m])
-        rows = self._jets(t, _pack(x), contact, *self._side(mode))
-        return [Jet(*rows[k]) for k in range(self.m + self.k)]
+        """Return one jet for each constraint, then one for each surface.
+
+        For a constraint in contact, acceleration and jerk are the multiplier q and its
+        rate: q is zero at the release.
+        """
+        if self.planar:
+            rows = self._jets(t, _pack(x), *self._held(mode))
+            return [Jet(*rows[0])]
+        along = self._series(t, _pack(x), *self._held(mode)).along
+        found = []
+        for k in range(self.m):
+            gap, velocity, acceleration, jerk = (part.gaps[k] for part in along)
+            q, rate = along[0].multipliers[k], along[1].multipliers[k]
+            acceleration = jnp.where(mode[k], q, acceleration)
+            found.append(
+                Jet(gap, velocity, acceleration, jnp.where(mode[k], rate, jerk))
+            )
+        for k in range(self.k):
+            value, *rates = (part.surfaces[k] for part in along)
+            # the rates at a surface where a contact holds the motion are rounding
+            still = along[0].still[k]
+            found.append(Jet(value, *(jnp.where(still, 0.0, rate) for rate in rates)))
+        return found
 
     def taylor(self, t, x, mode):
         """Return the first, second and third time derivatives of the state as three
         tuples.
         """
-        contact = _pack(mode[: self.m])
-        rows = self._taylor(t, _pack(x), contact, *self._side(mode))
+        if self.planar:
+            rows = self._taylor(t, _pack(x), *self._held(mode))
+        else:
+            rows = self._series(t, _pack(x), *self._held(mode)).rates
         return tuple(tuple(row) for row in rows)
+
+    def open_surfaces(self, t, x, mode) -> tuple[list[Jet], tuple]:
+        """Return the jets of the surfaces, and the rounding errors of their distances,
+        without contacts and sliding.
+        """
+        rows, rounding = self._open(t, _pack(x), *self._side(mode))
+        return [Jet(*row) for row in rows], tuple(rounding)
 
     def impact(self, t, x, mode):
         """Return the state after an impact at each constraint, then after the crossing
@@ -297,6 +345,17 @@ class Functions:
         return x
 
 
+def _series(function, t, x, *rest) -> MotionSeries:
+    """Return the series of `motion_series` by nested derivatives of arrays."""
+
+    def field(s, y):
+        return function(s, y, *rest)[0]
+
+    rates = motion_rates(field, t, x)
+    along = along_path(lambda s, y: function(s, y, *rest)[1], t, x, rates, 3)
+    return MotionSeries(list(rates), list(along))
+
+
 def _pack(scalars) -> np.ndarray:
     out = np.empty(len(scalars), dtype=object)
     for i, s in enumerate(scalars):
@@ -304,7 +363,7 @@ def _pack(scalars) -> np.ndarray:
     return out
 
 
-def in_mode(function, m: int, jumps: tuple):
+def in_mode(function, m: int, jumps: Jumps):
     """Convert a `function` of a system to one in a given mode, its last argument."""
 
     def call(system, *arguments):
@@ -318,30 +377,3 @@ def in_mode(function, m: int, jumps: tuple):
 
 def _negative(system: SwitchedSystem, t, x):
     return system.sides(t, x) < 0
-
-
-def _planar_jet(system, t, x, contact):
-    """Return the free jet; in contact, the rate of the normal acceleration `a` along
-    the sticking motion is `j - C a`, with the jerk `j`.
-    """
-    jet = free_jet(system, t, x)
-    direction = normal_directions(system, t, x)[0]
-    _, damping = jax.jvp(
-        lambda y: normal_acceleration(system, t, y)[0], (x,), (direction,)
-    )
-    along = jet[0, 3] - damping * jet[0, 2]
-    jerk = jnp.where(contact[0], along, jet[0, 3])
-    return jnp.stack([jet[0, 0], jet[0, 1], jet[0, 2], jerk])[None]
-
-
-def _taylor_of(field, t, x):
-    return jnp.stack(lie_series(field, field, 2)(t, x))
-
-
-def _free_taylor(system, t, x, contact):
-    del contact
-    return _taylor_of(lambda s, y: system.vector_field(s, y), t, x)
-
-
-def _mode_taylor(field, system, t, x, contact):
-    return _taylor_of(lambda s, y: field(system, s, y, contact), t, x)

@@ -10,12 +10,12 @@ from jax.extend.core import Literal
 
 from .._switched import SwitchedSystem
 from ..lowering import scalarise, split
-from ..surface import has_friction, surfaces
+from ..surface import has_friction, Jumps, surfaces
 
 
 def jumping_components(
     system: SwitchedSystem, shapes, time, state, number: int
-) -> tuple[tuple[int, ...], ...]:
+) -> Jumps:
     """Return, for each surface, the components of the rates that its side changes.
 
     These are those of the field and, in contact, those that friction changes. They are
@@ -32,7 +32,7 @@ def jumping_components(
         number: Number of surfaces, k.
 
     Returns:
-        Indices, one tuple for each surface.
+        The components, with and without contacts.
     """
     _, static = eqx.partition(system, eqx.is_inexact_array)
     k, n = number, state.shape[0]
@@ -48,16 +48,19 @@ def jumping_components(
         return surfaces(eqx.combine(p, static), t, x)
 
     sides = jax.ShapeDtypeStruct((k,), np.float64)
-    by_side = _dependence(branch, (shapes, time, state, sides), k)
+    free = by_side = _dependence(branch, (shapes, time, state, sides), k)
     if has_friction(system):
         more = _dependence(friction, (shapes, time, state, sides), k)
         by_side = [a | b for a, b in zip(by_side, more, strict=True)]
     by_state = _dependence(switching, (shapes, time, state), n)
-    return tuple(
-        tuple(changed) if set(changed) & by_state[surface] else ()
-        for surface in range(k)
-        for changed in [[i for i in range(n) if surface in by_side[i]]]
-    )
+
+    def changed(sets):
+        found = [[i for i in range(n) if k in sets[i]] for k in range(number)]
+        return tuple(
+            tuple(own) if set(own) & by_state[k] else () for k, own in enumerate(found)
+        )
+
+    return Jumps(changed(by_side), changed(free))
 
 
 @no_type_check

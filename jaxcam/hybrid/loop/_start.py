@@ -41,15 +41,15 @@ def first_sides(functions: Functions, t, x, contact):
     """
     if not functions.k:
         return (), [], False, False
-    m, sides = functions.m, list(functions.sides(t, x))
+    sides = list(functions.sides(t, x))
     free = (jnp.asarray(False),) * functions.k
     slides, stuck = list(free), jnp.asarray(False)
 
     def jet_of(k, flag):
         """Return the jet of a surface on one of its sides, and whether x is on it."""
         mode = (*contact, *sides[:k], flag, *sides[k + 1 :], *free)
-        jet = functions.jets(t, x, mode)[m + k]
-        rounding = functions.blur(t, x, (0.0,) * functions.n, mode)[m + k]
+        jets, roundings = functions.open_surfaces(t, x, mode)
+        jet, rounding = jets[k], roundings[k]
         on = jnp.abs(jet.gap) <= rounding
         jet = jet._replace(gap=jnp.where(on, 0.0, jet.gap))
         return jet, on, on & moves_in(jet, rounding)

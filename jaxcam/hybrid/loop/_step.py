@@ -112,5 +112,7 @@ def make_step(
         effort = jnp.where(sticking, 0.0, effort)
     jets = functions.jets(seen, x, carried.mode)
     projected = functions.onto(frame, jets, x, carried.mode)
-    rates = functions.taylor(seen, projected, carried.mode)
+    # for surfaces, the jets contain the rates at x, and the projection is minute
+    start = x if functions.k else projected
+    rates = functions.taylor(seen, start, carried.mode)
     return Step(x, projected, jets, frame, rates, effort, scale)

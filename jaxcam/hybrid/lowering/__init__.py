@@ -3,6 +3,7 @@
 The only exception is `whole`, which adds missing transformations to a loop.
 """
 
+from ._elements import split as split
 from ._jaxprs import opened as opened, saving_jvp as saving_jvp
 from ._known import (
     computed as computed,
@@ -14,7 +15,12 @@ from ._materialise import (
     with_kept as with_kept,
     without_library as without_library,
 )
+from ._motion_series import (
+    motion_series as motion_series,
+    MotionSeries as MotionSeries,
+)
 from ._one_kernel import one_kernel as one_kernel
 from ._packing import pack as pack, Packed as Packed
-from ._scalarise import joined as joined, scalarise as scalarise, split as split
+from ._scalarise import joined as joined, scalarise as scalarise
+from ._scalars import Memory as Memory
 from ._whole import has_program as has_program, while_loop as while_loop, whole as whole

@@ -10,6 +10,7 @@ from typing import no_type_check
 
 import jax
 from jax.extend.core import ClosedJaxpr, Jaxpr
+from jax.interpreters import partial_eval
 
 
 # calls that only group operations
@@ -56,6 +57,14 @@ def equations(jaxpr) -> Iterator:
                     yield from equations(one.jaxpr)
                 elif isinstance(one, Jaxpr):
                     yield from equations(one)
+
+
+def without_unused(closed: ClosedJaxpr, used: list[bool] | None = None) -> ClosedJaxpr:
+    """Return a program without the equations on which no used result depends."""
+    jaxpr = closed.jaxpr
+    used = [True] * len(jaxpr.outvars) if used is None else used
+    less, _ = partial_eval.dce_jaxpr(jaxpr, used, instantiate=True)
+    return ClosedJaxpr(less, closed.consts)
 
 
 def saving_jvp(function: Callable) -> jax.custom_jvp:

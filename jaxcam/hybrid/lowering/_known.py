@@ -26,8 +26,19 @@ _NUMPY = {
     "mul": np.multiply,
     "ne": np.not_equal,
     "neg": np.negative,
+    "or": np.bitwise_or,
     "sub": np.subtract,
 }
+
+
+FOLDED = frozenset(_NUMPY)
+"""Operations on known scalars that `folded` computes."""
+
+
+def folded(name: str, scalars):
+    """Return the result of an operation on known scalars."""
+    with np.errstate(all="ignore"):
+        return _NUMPY[name](*scalars)
 
 
 # called for every scalar; see `_jaxprs.py`

@@ -18,26 +18,15 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import Literal
 
-from ._jaxprs import has_saving_rule, opened
+from ._elements import boxed, join, split as split, traced
+from ._jaxprs import has_saving_rule, opened, without_unused
 from ._known import computed, is_known, join_known
+from ._moves import moved, MOVES
+from ._scalars import Memory, once
 from ._sincos import sincos
+from ._taylor import by_nested_derivatives, coefficient, has_series, in_series, Series
 
 
-# operations that only move elements; the permutation is found by moving indices
-_MOVES = frozenset(
-    {
-        "reshape",
-        "squeeze",
-        "transpose",
-        "broadcast_in_dim",
-        "slice",
-        "rev",
-        "expand_dims",
-        "gather",
-        "dynamic_slice",
-        "copy",
-    }
-)
 _ELEMENTWISE = frozenset(
     """
     abs acos acosh add add_any and asin asinh atan atan2 atanh cbrt ceil clamp
@@ -46,33 +35,34 @@ _ELEMENTWISE = frozenset(
     not or pow rem round rsqrt select_n sign sin sinh sqrt square sub tan tanh xor
     """.split()
 )
-_SUMS = {"reduce_sum": jnp.add, "reduce_max": jnp.maximum, "reduce_min": jnp.minimum}
+_SUMS = {
+    "reduce_sum": jax.lax.add_p,
+    "reduce_max": jax.lax.max_p,
+    "reduce_min": jax.lax.min_p,
+}
 
 
-def split(array) -> np.ndarray:
-    """Return an array as a numpy array of scalars."""
-    shape = jnp.shape(array)
-    out = np.empty(shape, dtype=object)
-    for index in np.ndindex(shape):
-        # a zero-dimensional numpy array becomes a number, which counts as known
-        whole = not shape and not isinstance(array, np.ndarray)
-        out[index] = array if whole else array[index]
-    return out
-
-
-def join(elements: np.ndarray):
-    """Return the inverse of `split`."""
-    if elements.shape == ():
-        return jnp.asarray(elements[()])
-    flat = [jnp.asarray(e) for e in elements.ravel()]
-    return jnp.stack(flat).reshape(elements.shape)
+_TURNS = frozenset({"sin", "cos", "tan"})
+# those that rules for series use
+_PRIMITIVES = {
+    "add": jax.lax.add_p,
+    "add_any": jax.lax.add_p,
+    "sub": jax.lax.sub_p,
+    "mul": jax.lax.mul_p,
+    "div": jax.lax.div_p,
+    "neg": jax.lax.neg_p,
+    "ge": jax.lax.ge_p,
+    "select_n": jax.lax.select_n_p,
+    "max": jax.lax.max_p,
+    "min": jax.lax.min_p,
+}
 
 
 def joined(function: Callable) -> Callable:
     """Convert a `function` of arrays to split arrays, by joining its arguments."""
 
     def call(*arguments):
-        return jax.tree.map(split, function(*(join(_boxed(a)) for a in arguments)))
+        return jax.tree.map(split, function(*(join(boxed(a)) for a in arguments)))
 
     return call
 
@@ -87,29 +77,28 @@ def scalarise(function: Callable, *example) -> Callable:
         A function of the same pytrees with split arrays as leaves.
     """
     closed, shape = jax.make_jaxpr(function, return_shape=True)(*example)
+    closed = without_unused(closed)
     treedef = jax.tree.structure(shape)
 
-    def call(*arguments, memory: dict | None = None):
-        leaves = [_boxed(leaf) for leaf in jax.tree.leaves(arguments)]
-        consts = _constants(closed.consts)
-        memory = {} if memory is None else memory
-        outputs = _evaluate(closed.jaxpr, consts, leaves, memory)
-        return jax.tree.unflatten(treedef, outputs)
+    def call(*arguments, memory: Memory | None = None):
+        memory = Memory() if memory is None else memory
+        outputs = evaluated(closed, jax.tree.leaves(arguments), memory)
+        return jax.tree.unflatten(treedef, [traced(o, memory) for o in outputs])
 
     return call
+
+
+def evaluated(closed, leaves, memory: Memory) -> list[np.ndarray]:
+    """Return the results of a program of arrays, not yet traced, for split
+    arguments.
+    """
+    arguments = [boxed(leaf) for leaf in leaves]
+    return _evaluate(closed.jaxpr, _constants(closed.consts), arguments, memory)
 
 
 def _constants(values) -> list[np.ndarray]:
     """Return the constants of a jaxpr; those with known values become numbers."""
     return [split(v if isinstance(v, Tracer) else np.asarray(v)) for v in values]
-
-
-def _boxed(leaf) -> np.ndarray:
-    if isinstance(leaf, np.ndarray) and leaf.dtype == object:
-        return leaf
-    out = np.empty((), dtype=object)
-    out[()] = leaf
-    return out
 
 
 # called for every equation; see `_jaxprs.py`
@@ -141,8 +130,8 @@ def _apply(equation, inputs, memory):
     if inside is not None:
         return _evaluate(inside[0], _constants(inside[1]), inputs, memory)
     outputs = [v.aval for v in equation.outvars]
-    if name in _MOVES and all(is_known(e) for i in inputs[1:] for e in i.ravel()):
-        return [_move(equation, inputs)]
+    if name in MOVES and all(is_known(e) for i in inputs[1:] for e in i.ravel()):
+        return [moved(equation, inputs, memory)]
     if name == "concatenate":
         return [np.concatenate(inputs, axis=params["dimension"])]
     if name == "stack":
@@ -153,58 +142,30 @@ def _apply(equation, inputs, memory):
     if all(is_known(e) for i in inputs for e in i.ravel()):
         return [split(a) for a in computed(equation, [join_known(i) for i in inputs])]
     if name in _SUMS:
-        return [_reduce(_SUMS[name], inputs[0], params["axes"], outputs[0].shape)]
+        operation = _SUMS[name]
+        return [_reduce(operation, inputs[0], params["axes"], outputs[0].shape, memory)]
     if name == "dot_general" and _plain_product(params):
-        return [_product(inputs, params)]
+        return [_product(inputs, params, memory)]
     if name in _ELEMENTWISE:
         return [_elementwise(equation, inputs, outputs[0].shape, memory)]
+    if any(has_series(i.ravel()) for i in inputs):
+        return _by_derivatives(equation, inputs, memory)
     # a user-defined rule, such as a custom derivative, is among these parameters
     params = equation.primitive.get_bind_params(params)
-    made = equation.primitive.bind(*[join(i) for i in inputs], **params)
+    made = equation.primitive.bind(*[join(traced(i, memory)) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
     return [split(m) for m in made]
 
 
-def _move(equation, inputs):
-    """Find the destination of each element by applying the operation to indices."""
-    first, others = inputs[0], [join_known(i) for i in inputs[1:]]
-    name, params = equation.primitive.name, equation.params
-    if name in ("reshape", "squeeze"):
-        return first.reshape(equation.outvars[0].aval.shape)
-    if name == "slice":
-        strides = params["strides"] or (1,) * first.ndim
-        cuts = zip(params["start_indices"], params["limit_indices"], strides)
-        return first[tuple(slice(*c) for c in cuts)]
-    if name == "transpose":
-        return first.transpose(params["permutation"])
-    if name == "broadcast_in_dim":
-        shape, kept = params["shape"], params["broadcast_dimensions"]
-        sizes = [1] * len(shape)
-        for axis, dimension in enumerate(kept):
-            sizes[dimension] = first.shape[axis]
-        return np.broadcast_to(first.reshape(sizes), shape).copy()
-    indices = np.arange(first.size, dtype=np.int64).reshape(first.shape)
-    with jax.ensure_compile_time_eval():
-        target = np.asarray(
-            equation.primitive.bind(*map(jnp.asarray, (indices, *others)), **params)
-        )
-    if target.size and (target.min() < 0 or target.max() >= first.size):
-        # a gather with a fill value outside the range
-        return split(equation.primitive.bind(join(first), *others, **params))
-    out = np.empty(target.shape, dtype=object)
-    out.ravel()[:] = first.ravel()[target.ravel()]
-    return out
-
-
-def _reduce(operation, elements, axes, shape):
-    moved = np.moveaxis(elements, axes, range(len(axes)))
-    moved = moved.reshape((-1,) + tuple(shape))
+def _reduce(operation, elements, axes, shape, memory):
+    first = np.moveaxis(elements, axes, range(len(axes)))
+    first = first.reshape((-1,) + tuple(shape))
     out = np.empty(shape, dtype=object)
     for index in np.ndindex(tuple(shape)):
-        column = moved[(slice(None),) + index]
+        column = first[(slice(None),) + index]
         total = column[0]
         for e in column[1:]:
-            total = operation(total, e)
+            total = _binary(operation, total, e, memory)
         out[index] = total
     return out
 
@@ -214,19 +175,27 @@ def _plain_product(params) -> bool:
     return len(left) == 1 and not batch_left and not batch_right
 
 
-def _product(inputs, params):
+def _product(inputs, params, memory):
     ((left,), (right,)), _ = params["dimension_numbers"]
     a = np.moveaxis(inputs[0], left, -1)
     b = np.moveaxis(inputs[1], right, 0)
     out = np.empty(a.shape[:-1] + b.shape[1:], dtype=object)
     for i in np.ndindex(a.shape[:-1]):
         for k in np.ndindex(b.shape[1:]):
-            terms = [x * b[(n,) + k] for n, x in enumerate(a[i])]
+            pairs = [(x, b[(n,) + k]) for n, x in enumerate(a[i])]
+            terms = [_binary(jax.lax.mul_p, *pair, memory) for pair in pairs]
             total = terms[0]
             for term in terms[1:]:
-                total = total + term
+                total = _binary(jax.lax.add_p, total, term, memory)
             out[i + k] = total
     return out
+
+
+def _binary(primitive, a, b, memory):
+    """Apply a primitive of two operands without parameters."""
+    if not has_series((a, b)):
+        return once(primitive, {}, (a, b), memory)
+    return in_series(primitive.name, {}, (a, b), _rule_operation(None, memory))
 
 
 def _elementwise(equation, inputs, shape, memory):
@@ -240,53 +209,102 @@ def _elementwise(equation, inputs, shape, memory):
     return out
 
 
-def _scalar(equation, scalars, memory):
-    """Evaluate an operation on scalars, once for the same operands."""
+def _scalar(equation, elements, memory):
+    """Return the result of an operation on scalars, or on series."""
     name, params = equation.primitive.name, equation.params
+    if has_series(elements):
+        apply = _rule_operation(equation, memory)
+        made = in_series(name, params, elements, apply)
+        if made is not None:
+            return made
+        parts = [boxed(e) for e in elements]
+        return _by_derivatives(equation, parts, memory)[0][()]
+    dtype = equation.outvars[0].aval.dtype
     if name == "convert_element_type":
-        kind = params["new_dtype"]
-        if not is_known(scalars[0]) and scalars[0].dtype == kind:
-            return scalars[0]
-    shortcut = _identity(name, scalars)
-    if shortcut is not None:
-        return shortcut
-    operands = tuple(
-        ("known", s.item() if isinstance(s, np.generic) else s, str(np.result_type(s)))
-        if is_known(s)
-        else id(s)
-        for s in scalars
+        if not is_known(elements[0]) and elements[0].dtype == dtype:
+            return elements[0]
+    if name in _TURNS and dtype == "float64":
+        return _turn(name, elements, memory)
+    return once(equation.primitive, params, elements, memory, dtype)
+
+
+def _turn(name, elements, memory):
+    pair = once(sincos, {}, elements, memory, np.dtype(np.float64))
+    if name != "tan":
+        return once(_sine if name == "sin" else _cosine, {}, (pair,), memory)
+    parts = [once(part, {}, (pair,), memory) for part in (_sine, _cosine)]
+    return once(jax.lax.div_p, {}, parts, memory)
+
+
+def _sine(pair):
+    return pair[0]
+
+
+def _cosine(pair):
+    return pair[1]
+
+
+def _rule_operation(equation, memory):
+    """Return the function that applies an operation in a rule for series."""
+
+    def apply(name, *scalars):
+        if name in _TURNS:
+            return _turn(name, scalars, memory)
+        if equation is not None and name == equation.primitive.name:
+            dtype = equation.outvars[0].aval.dtype
+            return once(equation.primitive, equation.params, scalars, memory, dtype)
+        dtype = np.dtype(bool) if name == "ge" else None
+        return once(_PRIMITIVES[name], {}, scalars, memory, dtype)
+
+    return apply
+
+
+def _by_derivatives(equation, inputs, memory):
+    """Evaluate any operation on arrays of series."""
+    order = max(
+        len(e.coefficients) - 1
+        for i in inputs
+        for e in i.ravel()
+        if isinstance(e, Series)
     )
-    turn = name in ("sin", "cos", "tan") and equation.outvars[0].aval.dtype == "float64"
-    key = ("sincos" if turn else name, str(params), operands)
-    if key not in memory:
-        arrays = [jnp.asarray(s) for s in scalars]
-        made = sincos(arrays[0]) if turn else equation.primitive.bind(*arrays, **params)
-        # the operands are kept, so that their identities are not reused
-        memory[key] = (made, scalars)
-    made = memory[key][0]
-    if not turn:
-        return made
-    sine, cosine = made
-    return sine if name == "sin" else cosine if name == "cos" else sine / cosine
+    params = equation.primitive.get_bind_params(equation.params)
+
+    def function(*arrays):
+        made = equation.primitive.bind(*arrays, **params)
+        return made if equation.primitive.multiple_results else [made]
+
+    arguments = []
+    for elements in inputs:
+        if has_series(elements.ravel()):
+            elements = [_part(elements, k) for k in range(order + 1)]
+        arguments.append(elements)
+    shapes = [
+        jax.tree.map(
+            lambda part, v=v: jax.ShapeDtypeStruct(part.shape, v.aval.dtype), a
+        )
+        for a, v in zip(arguments, equation.invars, strict=True)
+    ]
+    program = jax.make_jaxpr(by_nested_derivatives(function, order))(*shapes)
+    made = evaluated(without_unused(program), jax.tree.leaves(arguments), memory)
+    number = len(equation.outvars)
+    return [
+        _joined_orders(made[i::number])
+        if jnp.issubdtype(v.aval.dtype, jnp.floating)
+        else made[i]
+        for i, v in enumerate(equation.outvars)
+    ]
 
 
-def _identity(name, scalars):
-    """Simplify sums with zero and products with zero or one, which differentiation
-    leaves.
-    """
-    if len(scalars) != 2 or name not in ("add", "add_any", "sub", "mul"):
-        return None
-    a, b = scalars
-    if name == "mul":
-        for known, other in ((a, b), (b, a)):
-            if is_known(known) and isinstance(known, np.floating):
-                if known == 1.0:
-                    return other
-                if known == 0.0:
-                    return known
-        return None
-    if is_known(b) and isinstance(b, np.floating) and b == 0.0:
-        return a
-    if name != "sub" and is_known(a) and isinstance(a, np.floating) and a == 0.0:
-        return b
-    return None
+def _part(elements: np.ndarray, order: int) -> np.ndarray:
+    out = np.empty(elements.shape, dtype=object)
+    for index in np.ndindex(elements.shape):
+        out[index] = coefficient(elements[index], order)
+    return out
+
+
+def _joined_orders(parts: list[np.ndarray]) -> np.ndarray:
+    """Return an array of series from the arrays of their coefficients."""
+    out = np.empty(parts[0].shape, dtype=object)
+    for index in np.ndindex(out.shape):
+        out[index] = Series(part[index] for part in parts)
+    return out

@@ -10,6 +10,13 @@ from ._chatter import (
     completion_time as completion_time,
 )
 from ._compliance import least_compliance as least_compliance
+from ._contact_forces import (
+    contact_multipliers as contact_multipliers,
+    Distances as Distances,
+    field_and_distances as field_and_distances,
+    field_in_force as field_in_force,
+    sticking_field as sticking_field,
+)
 from ._contact_friction import has_friction as has_friction
 from ._impact_law import (
     check_restitution as check_restitution,
@@ -30,17 +37,15 @@ from ._joint_rest import (
     SLOW_REBOUND as SLOW_REBOUND,
 )
 from ._normal import (
-    contact_multipliers as contact_multipliers,
-    field_in_force as field_in_force,
+    along_path as along_path,
     free_jet as free_jet,
     gaps as gaps,
     lie_derivative as lie_derivative,
     lie_series as lie_series,
-    mode_jet as mode_jet,
+    motion_rates as motion_rates,
     normal_acceleration as normal_acceleration,
     normal_directions as normal_directions,
     normal_velocity as normal_velocity,
-    sticking_field as sticking_field,
 )
 from ._release_point import (
     contact_acceleration as contact_acceleration,
@@ -57,12 +62,14 @@ from ._rounding import (
 )
 from ._sliding import (
     beyond_shares as beyond_shares,
+    field_and_distances_in_mode as field_and_distances_in_mode,
     field_in_mode as field_in_mode,
     heights_rounded as heights_rounded,
     InMode as InMode,
+    Jumps as Jumps,
+    open_surfaces as open_surfaces,
     settled as settled,
     slack_of_hold as slack_of_hold,
-    switched_jet as switched_jet,
     switched_rounding as switched_rounding,
 )
 from ._switches import (

@@ -24,13 +24,13 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
+from ._contact_forces import sticking_field
 from ._impacts import impacts, restitution_coefficients
 from ._normal import (
     lie_derivative,
     normal_acceleration,
     normal_directions,
     normal_velocity,
-    sticking_field,
 )
 
 

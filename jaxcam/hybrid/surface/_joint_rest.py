@@ -6,9 +6,9 @@ from jaxtyping import Array, Bool, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
+from ._contact_forces import contact_multipliers
 from ._masked import solve_masked
 from ._normal import (
-    contact_multipliers,
     gaps,
     normal_directions,
     normal_velocity,

@@ -12,12 +12,10 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
-from ._contact_friction import friction_of, has_friction
-from ._masked import solve_masked
 
 
 def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
@@ -73,6 +71,41 @@ def lie_series(function: Callable, field: Callable, order: int) -> Callable:
     for _ in range(order):
         series = one_more(series)
     return series
+
+
+def along_path(function: Callable, t, x, rates: tuple, order: int) -> tuple:
+    """Return `function` and its rates of change up to `order` along a motion through
+    `(t, x)`, whose first rates are given.
+
+    The function may return any pytree. In contrast to `lie_series`, the field is not
+    evaluated again.
+    """
+
+    def at(time):
+        change, number = rates[-1], len(rates)
+        for k in reversed(range(number - 1)):
+            change = rates[k] + time * change / (k + 2)
+        return (function(t + time, x + time * change),)
+
+    def one_more(below):
+        def series(time):
+            values, slopes = jax.jvp(below, (time,), (jnp.ones_like(time),))
+            return (*values, slopes[-1])
+
+        return series
+
+    series = at
+    for _ in range(order):
+        series = one_more(series)
+    return series(jnp.zeros(()))
+
+
+def motion_rates(field: Callable, t, x) -> tuple[State, State, State]:
+    """Return the first three time derivatives of the motion through `(t, x)`."""
+    first = field(t, x)
+    _, second = along_path(field, t, x, (first,), 1)
+    *_, third = along_path(field, t, x, (first, second), 2)
+    return first, second, third
 
 
 def normal_velocity(system, t, x) -> Float[Array, " m"]:
@@ -143,6 +176,11 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
         ((1, 2), 1.0)
     """
     gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
+    return unit_directions(system, t, x, gradient)
+
+
+def unit_directions(system, t, x, gradient: Float[Array, "m n"]):
+    """Return the directions D for the gradient of the normal velocities."""
     number = gradient.shape[0]
     if not number:
         return gradient
@@ -156,78 +194,6 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
         # only the direction matters, because its length is fixed by v_x D = 1
         rows.append(moved / jnp.sum(gradient[k] * moved))
     return jnp.stack(rows)
-
-
-def force_directions(system, t, x) -> Float[Array, "m n"]:
-    """Return the changes of the rates by unit contact forces, friction included."""
-    directions = normal_directions(system, t, x)
-    if not has_friction(system):
-        return directions
-    return directions + friction_of(system, t, x)
-
-
-def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:
-    """Return q with F_s = F - sum q_k D_k over the constraints in contact, where the
-    D_k include friction.
-
-    With one constraint without friction, q = a. The contact force is compressive while
-    q < 0, and the contact ends when q rises through zero. For constraints that are not
-    in contact, q is zero.
-    """
-    acceleration = normal_acceleration(system, t, x)
-    if acceleration.shape[0] == 1 and not has_friction(system):
-        return jnp.where(contact, acceleration, jnp.zeros_like(acceleration))
-    directions = force_directions(system, t, x)
-    gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
-    return solve_masked(gradient @ directions.T, acceleration, contact)
-
-
-def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
-    """Return the field of free flight, or of sticking on the constraints in `contact`.
-
-    Args:
-        system: The system.
-        t: Time (s).
-        x: State, shape `(n,)`.
-        contact: Which constraints are in contact, shape `(m,)`.
-
-    Returns:
-        Rates of the state, shape `(n,)` (thesis, eq. 2.30).
-
-    Examples:
-        >>> from jaxcam.hybrid.surface import field_in_force
-        >>> from jaxcam.models import BouncingBall
-        >>> ball, held = BouncingBall(), jnp.array([True])
-        >>> field_in_force(ball, 0.0, jnp.zeros(2), held).tolist()
-        [0.0, 0.0]
-    """
-    if not contact.shape[0]:
-        return system.vector_field(t, x)
-    multipliers = contact_multipliers(system, t, x, contact)
-    directions = force_directions(system, t, x)
-    push = jnp.sum(multipliers[:, None] * directions, axis=0)
-    return system.vector_field(t, x) - push
-
-
-def sticking_field(system: HybridSystem, t: RealScalar, x: State) -> State:
-    """Return the field of sustained contact with every constraint.
-
-    Args:
-        system: The system.
-        t: Time (s).
-        x: State on the surface, shape `(n,)`.
-
-    Returns:
-        Rates of the state, shape `(n,)` (thesis, eqs. 2.30 and 2.31).
-
-    Examples:
-        >>> from jaxcam.hybrid.surface import sticking_field
-        >>> from jaxcam.models import BouncingBall
-        >>> sticking_field(BouncingBall(), 0.0, jnp.zeros(2)).tolist()
-        [0.0, 0.0]
-    """
-    everywhere = jnp.ones(gaps(system, t, x).shape, dtype=bool)
-    return field_in_force(system, t, x, everywhere)
 
 
 def free_jet(system, t, x) -> Float[Array, "m 4"]:
@@ -256,40 +222,3 @@ def free_jet(system, t, x) -> Float[Array, "m 4"]:
         return gaps(system, s, y)
 
     return jnp.stack(lie_series(gap, field, 3)(t, x), axis=1)
-
-
-def mode_jet(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, "m 4"]:
-    """Return H, v, a and j of each gap along the active field.
-
-    For a constraint in contact, a and j are the multiplier q and its rate; the zero of
-    q is the release.
-    """
-
-    def field(s, y):
-        return field_in_force(system, s, y, contact)
-
-    def multiplier(s, y):
-        return contact_multipliers(system, s, y, contact)
-
-    return jet_along(system, t, x, contact, field, multiplier)
-
-
-def jet_along(system, t, x, contact, field: Callable, multiplier: Callable):
-    """Return the jets of `mode_jet` along a field, with the multipliers of contacts."""
-    if not contact.shape[0]:
-        return jnp.zeros((0, 4))
-
-    def gap(s, y):
-        return gaps(system, s, y)
-
-    value, velocity, acceleration, jerk = lie_series(gap, field, 3)(t, x)
-    pressing, release = lie_series(multiplier, field, 1)(t, x)
-    return jnp.stack(
-        [
-            value,
-            velocity,
-            jnp.where(contact, pressing, acceleration),
-            jnp.where(contact, release, jerk),
-        ],
-        axis=1,
-    )

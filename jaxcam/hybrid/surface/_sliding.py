@@ -26,8 +26,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .._types import RealScalar, State
+from ._contact_forces import contact_forces, contact_terms, Distances
 from ._masked import solve_masked
-from ._normal import contact_multipliers, field_in_force, jet_along, lie_series
+from ._normal import along_path, gaps, motion_rates
 from ._rounding import gap_rounding, rounding_of
 from ._switches import OnSides, surfaces
 
@@ -35,6 +36,17 @@ from ._switches import OnSides, surfaces
 # a surface is held by a contact if the contact forces undo this fraction of the change
 # that its sides make
 _UNDONE = 1e-12
+
+
+class Jumps(NamedTuple):
+    """For each surface, the components of the field that its side changes; none if no
+    motion can slide on it.
+    """
+
+    held: tuple[tuple[int, ...], ...] = ()
+    """In contact: by the branch and by friction."""
+    free: tuple[tuple[int, ...], ...] = ()
+    """Without contacts: by the branch."""
 
 
 class InMode(OnSides):
@@ -46,16 +58,22 @@ class InMode(OnSides):
     """Whether the motion slides on each surface, shape `(k,)`."""
     contact: Bool[Array, " m"]
     """Which constraints are in contact, shape `(m,)`."""
-    jumps: tuple[tuple[int, ...], ...] = eqx.field(static=True)
-    """For each surface, the components of the field that its side changes; empty if no
-    motion can slide on it."""
+    jumping: Jumps = eqx.field(static=True)
+    """The components of the field that change at the surfaces."""
 
     def vector_field(self, t: RealScalar, state: State) -> State:
-        """Return the rates of the branch, or of sliding."""
-        if not self.slidable:
+        """Return the rates of the branch, or of sliding, without contacts."""
+        free = Jumps(self.jumping.free, self.jumping.free)
+        none = self.contact[:0]
+        mode = InMode(self.system, self.negative, self.sliding, none, free)
+        if not mode.slidable:
             return super().vector_field(t, state)
-        free = eqx.tree_at(lambda mode: mode.contact, self, self.contact[:0])
-        return _combined(free, slide_terms(free, t, state))
+        return _combined(mode, slide_terms(mode, t, state))
+
+    @property
+    def jumps(self) -> tuple[tuple[int, ...], ...]:
+        """For each surface, the components of the field that its side changes."""
+        return self.jumping.held
 
     @property
     def slidable(self) -> list[int]:
@@ -84,46 +102,66 @@ class SlideTerms(NamedTuple):
     still: Bool[Array, " K"]
     # the field on the side from which the motion came
     field: Float[Array, " n"]
+    # multipliers of the contacts there, and their changes beyond each surface
+    multipliers: Float[Array, " m"]
+    changes: Float[Array, "K m"]
 
 
 def slide_terms(mode: InMode, t, x) -> SlideTerms:
     """Return the terms of sliding, contact forces included."""
     chosen = mode.slidable
     before = OnSides(mode.system, mode.negative)
-    free = before.vector_field(t, x)
     beyond = [mode.beyond(k) for k in chosen]
-    changes = [side.vector_field(t, x) - free for side in beyond]
-    kicks = [
-        jnp.stack(
-            [d[i] if i in mode.jumps[k] else jnp.zeros(()) for i in range(len(x))]
-        )
-        for k, d in zip(chosen, changes, strict=True)
-    ]
+    own = before.vector_field(t, x)
+    kicks = jnp.stack(
+        [
+            _only(mode.jumps[k], side.vector_field(t, x) - own)
+            for k, side in zip(chosen, beyond, strict=True)
+        ]
+    )
 
     def heights(s, y):
         values = mode.signs * surfaces(mode.system, s, y)
         return jnp.stack([values[k] for k in chosen])
 
-    def gains_of(kicks):
-        columns = [
-            jax.jvp(heights, (t, x), (jnp.zeros_like(t), kick))[1] for kick in kicks
-        ]
-        return jnp.stack(columns, axis=1)
-
-    gains, field = gains_of(kicks), free
-    number = range(len(chosen))
-    own = jnp.stack([gains[i, i] for i in number])
-    least = jnp.zeros_like(own)
+    values, drift = jax.jvp(lambda s: heights(s, x), (t,), (jnp.ones_like(t),))
+    gradient = jax.jacfwd(lambda y: heights(t, y))(x)
+    gains, field = gradient @ kicks.T, own
+    multipliers, changes = jnp.zeros((0,)), jnp.zeros((len(chosen), 0))
+    largest, least = jnp.abs(_own(gains)), jnp.zeros(len(chosen))
     if mode.contact.shape[0]:
-        field = field_in_force(before, t, x, mode.contact)
-        kicks = [field_in_force(side, t, x, mode.contact) - field for side in beyond]
-        gains, least = gains_of(kicks), _UNDONE * jnp.abs(own)
-        own = jnp.stack([gains[i, i] for i in number])
-    values, slopes = jax.jvp(heights, (t, x), (jnp.ones_like(t), field))
-    largest = jnp.maximum(jnp.abs(own), jnp.abs(slopes))
+        terms = contact_terms(before, t, x)
+        multipliers, field = contact_forces(before, t, x, mode.contact, terms)
+        forces = [contact_forces(side, t, x, mode.contact, terms) for side in beyond]
+        kicks = jnp.stack([each.field - field for each in forces])
+        changes = jnp.stack([each.multipliers - multipliers for each in forces])
+        least = _UNDONE * largest
+        gains = gradient @ kicks.T
+    slopes, own_gains = drift + gradient @ field, _own(gains)
+    largest = jnp.maximum(jnp.abs(own_gains), jnp.abs(slopes))
     still = (least > 0) & (largest <= least)
-    kicks = jnp.stack(kicks)
-    return SlideTerms(values, slopes, kicks, gains, own > least, still, field)
+    return SlideTerms(
+        values,
+        slopes,
+        kicks,
+        gains,
+        own_gains > least,
+        still,
+        field,
+        multipliers,
+        changes,
+    )
+
+
+def _own(gains: Float[Array, "K K"]) -> Float[Array, " K"]:
+    """Return the diagonal."""
+    return jnp.stack([gains[k, k] for k in range(len(gains))])
+
+
+def _only(changed: tuple[int, ...], change: State) -> State:
+    """Return the given components of a change of the field, zero elsewhere."""
+    parts = [change[i] if i in changed else jnp.zeros(()) for i in range(len(change))]
+    return jnp.stack(parts)
 
 
 def shares(mode: InMode, terms: SlideTerms) -> Float[Array, " K"]:
@@ -133,27 +171,28 @@ def shares(mode: InMode, terms: SlideTerms) -> Float[Array, " K"]:
     return solve_masked(terms.gains, -terms.slopes, _slides_on(mode) & terms.firm)
 
 
-def field_in_mode(mode: InMode, t, x, contact: Bool[Array, " m"]) -> State:
-    """Return the field of free flight, contact or sliding, as `field_in_force`."""
-    if not mode.slidable:
-        return field_in_force(mode, t, x, contact)
-    return _combined(mode, slide_terms(mode, t, x))
+def field_in_mode(mode: InMode, t, x) -> State:
+    """Return the field of free flight, contact or sliding."""
+    return forces_in_mode(mode, t, x)[1]
 
 
-def multipliers_in_mode(mode: InMode, t, x, contact: Bool[Array, " m"]):
-    """Return the multipliers of the constraints, as `contact_multipliers`.
+def forces_in_mode(mode: InMode, t, x) -> tuple[Float[Array, " m"], State]:
+    """Return the multipliers of the constraints, and the field.
 
-    Like the field, they are those of the branch and the weights of their changes.
+    Like the field, the multipliers are those of the branch and the weights of their
+    changes.
     """
     if not mode.slidable:
-        return contact_multipliers(mode, t, x, contact)
-    found = shares(mode, slide_terms(mode, t, x))
-    own = contact_multipliers(OnSides(mode.system, mode.negative), t, x, contact)
-    total = own
-    for share, k in zip(found, mode.slidable, strict=True):
-        change = contact_multipliers(mode.beyond(k), t, x, contact) - own
+        if mode.contact.shape[0]:
+            return contact_forces(mode, t, x, mode.contact)
+        return jnp.zeros((0,)), mode.vector_field(t, x)
+    terms = slide_terms(mode, t, x)
+    total = terms.multipliers
+    for change, share, k in zip(
+        terms.changes, shares(mode, terms), mode.slidable, strict=True
+    ):
         total = total + jnp.where(mode.sliding[k], share * change, 0.0)
-    return total
+    return total, _combined(mode, terms)
 
 
 def _combined(mode: InMode, terms: SlideTerms) -> State:
@@ -200,6 +239,20 @@ def distances(mode: InMode, t, x) -> Float[Array, " k"]:
     return jnp.stack(rows)
 
 
+def open_surfaces(mode: InMode, t, x) -> tuple:
+    """Return distance and three rates of each surface, shape `(k, 4)`, and the rounding
+    error of the distance, `(k,)`, for a motion without contacts that does not slide.
+    """
+    side = OnSides(mode.system, mode.negative)
+
+    def distance(s, y):
+        return mode.signs * surfaces(mode.system, s, y) + mode.system.hysteresis
+
+    rates = motion_rates(side.vector_field, t, x)
+    jets = jnp.stack(along_path(distance, t, x, rates, 3), axis=1)
+    return jets, rounding_of(distance, t, x, jnp.abs(x))
+
+
 def beyond_shares(mode: InMode, t, x) -> Float[Array, " k"]:
     """Return the weight of the branch beyond each surface, shape `(k,)`; zero where the
     motion does not slide.
@@ -237,35 +290,16 @@ def heights_rounded(mode: OnSides, t, x, reach: State) -> Float[Array, "2 k"]:
     return jnp.stack([values(t, x), rounding_of(values, t, x, reach)])
 
 
-def switched_jet(mode: InMode, t, x, contact: Bool[Array, " m"]):
-    """Return distance and three rates of each constraint, then of each surface.
-
-    Shape `(m + k, 4)`; for a constraint in contact as `mode_jet`.
-    """
-
-    def field(s, y):
-        return field_in_mode(mode, s, y, contact)
-
-    def multiplier(s, y):
-        return multipliers_in_mode(mode, s, y, contact)
-
-    along = lie_series(lambda s, y: distances(mode, s, y), field, 3)(t, x)
-    own = jnp.stack(along, axis=1)
-    if not contact.shape[0]:
-        return own
-    gaps = jet_along(mode, t, x, contact, field, multiplier)
-    return jnp.concatenate([gaps, _still(mode, t, x, own)])
-
-
-def _still(mode: InMode, t, x, jets):
-    """Remove the rates at surfaces where a contact holds the motion: rounding."""
-    if not mode.slidable:
-        return jets
-    still, rows = slide_terms(mode, t, x).still, list(jets)
-    for i, k in enumerate(mode.slidable):
-        at_rest = jnp.concatenate([rows[k][:1], jnp.zeros_like(rows[k][1:])])
-        rows[k] = jnp.where(still[i], at_rest, rows[k])
-    return jnp.stack(rows)
+def field_and_distances_in_mode(mode: InMode, t, x) -> tuple[State, Distances]:
+    """Return the field and the distances in this mode, those of the contacts first."""
+    multipliers, field = forces_in_mode(mode, t, x)
+    still = [jnp.asarray(False) for _ in mode.jumps]
+    if mode.slidable and mode.contact.shape[0]:
+        held = slide_terms(mode, t, x).still
+        for i, k in enumerate(mode.slidable):
+            still[k] = held[i]
+    own = distances(mode, t, x)
+    return field, Distances(gaps(mode, t, x), multipliers, own, jnp.stack(still))
 
 
 def switched_rounding(mode: InMode, t, x, reach: State):

@@ -1,0 +1,57 @@
+"""Operations that only move the elements of an array."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._elements import join, split, traced
+from ._known import join_known
+
+
+MOVES = frozenset(
+    {
+        "reshape",
+        "squeeze",
+        "transpose",
+        "broadcast_in_dim",
+        "slice",
+        "rev",
+        "expand_dims",
+        "gather",
+        "dynamic_slice",
+        "copy",
+    }
+)
+"""Their names."""
+
+
+def moved(equation, inputs, memory):
+    """Return the moved elements, found by applying the operation to indices."""
+    first, others = inputs[0], [join_known(i) for i in inputs[1:]]
+    name, params = equation.primitive.name, equation.params
+    if name in ("reshape", "squeeze"):
+        return first.reshape(equation.outvars[0].aval.shape)
+    if name == "slice":
+        strides = params["strides"] or (1,) * first.ndim
+        cuts = zip(params["start_indices"], params["limit_indices"], strides)
+        return first[tuple(slice(*c) for c in cuts)]
+    if name == "transpose":
+        return first.transpose(params["permutation"])
+    if name == "broadcast_in_dim":
+        shape, kept = params["shape"], params["broadcast_dimensions"]
+        sizes = [1] * len(shape)
+        for axis, dimension in enumerate(kept):
+            sizes[dimension] = first.shape[axis]
+        return np.broadcast_to(first.reshape(sizes), shape).copy()
+    indices = np.arange(first.size, dtype=np.int64).reshape(first.shape)
+    with jax.ensure_compile_time_eval():
+        target = np.asarray(
+            equation.primitive.bind(*map(jnp.asarray, (indices, *others)), **params)
+        )
+    if target.size and (target.min() < 0 or target.max() >= first.size):
+        # a gather with a fill value outside the range
+        whole = join(traced(first, memory))
+        return split(equation.primitive.bind(whole, *others, **params))
+    out = np.empty(target.shape, dtype=object)
+    out.ravel()[:] = first.ravel()[target.ravel()]
+    return out
