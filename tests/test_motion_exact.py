@@ -490,10 +490,11 @@ def test_point_in_a_square_hits_the_nearer_wall_first():
     assert np.array_equal(trajectory.impacts.constraint, walls)
 
 
-def test_corner_is_two_impacts_at_one_time():
+def test_corner_is_one_impact_on_both_walls():
     system = Box(jnp.asarray(1.0), jnp.asarray(0.5))
     trajectory = run(system, [0.5, 0.5, 1.0, 1.0], 0.0, 1.0)
-    assert sorted(np.asarray(trajectory.impacts.constraint).tolist()) == [2, 3]
+    (wall,) = np.asarray(trajectory.impacts.constraint).tolist()
+    assert wall in (2, 3)
     assert np.max(np.abs(trajectory.impacts.time - 0.5)) < 1e-12
     assert np.max(np.abs(trajectory.final - np.array([0.75, 0.75, -0.5, -0.5]))) < 1e-12
 

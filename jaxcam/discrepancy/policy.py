@@ -8,6 +8,7 @@ the verdict. The third group determines the content of a report.
 
 import dataclasses
 import enum
+import functools
 import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -23,20 +24,13 @@ class Group(enum.StrEnum):
     REPORT = "report"
 
 
-def _decides(default: Any, says: str) -> Any:
-    return _number(Group.VERDICT, default, says)
-
-
-def _bounds(default: Any, says: str) -> Any:
-    return _number(Group.BUDGET, default, says)
-
-
-def _shows(default: Any, says: str) -> Any:
-    return _number(Group.REPORT, default, says)
-
-
 def _number(group: Group, default: Any, says: str) -> Any:
     return dataclasses.field(default=default, metadata={"group": group, "says": says})
+
+
+_decides = functools.partial(_number, Group.VERDICT)
+_bounds = functools.partial(_number, Group.BUDGET)
+_shows = functools.partial(_number, Group.REPORT)
 
 
 class Setting(NamedTuple):
@@ -90,6 +84,12 @@ class Policy:
         "fraction of the explained cost that the smoothing of dry friction at zero "
         "velocity may leave; next to a friction term, a term that explains less is not "
         "named",
+    )
+    differs: float = _decides(
+        0.5, "minimum fraction of the misfit that separate values must explain"
+    )
+    as_much: float = _decides(
+        0.9, "fraction of their gain above which a common function is sought"
     )
     near: float = _decides(
         4.0, "cost per sample below which an unconverged fit counts as near the data"
@@ -310,10 +310,10 @@ class Policy:
         "distance within which data count as near a point, as a fraction of the range",
     )
     visited: float = _shows(
-        0.1,
-        "minimum data density at which a function is shown, relative to uniform",
+        0.1, "minimum data density at which a function is shown, relative to uniform"
     )
     shape_points: int = _shows(48, "number of points at which a free function is shown")
+    several: int = _shows(6, "maximum number of recordings whose values are listed")
     alternatives: int = _shows(8, "maximum number of alternatives listed")
 
     def __post_init__(self):

@@ -4,6 +4,7 @@ import dataclasses
 from typing import NamedTuple
 
 from ...fitting import Fit
+from ..policy import Policy
 from ..search import (
     FreeSearch,
     Missing,
@@ -22,10 +23,6 @@ from ._redrawn import Needs, needs, redrawn, sure
 from ._rivals import Rival, rivals
 from ._structure import Structure, structures
 from ._visited_states import visited_states
-
-
-# Share of the gain of separate values above which a common function may explain as much
-_AS_MUCH = 0.9
 
 
 class Outside(NamedTuple):
@@ -114,10 +111,10 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     missing, needed_parts, others = None, None, ()
     left = [one for one in left_after if one.significant]
     different = differing(best.fit, trials.policy)
-    settled = _settled(different, left, best.bic)
+    settled = _settled(different, left, best.bic, trials.policy)
     if left and best.names and not settled:
         without = differing(before.fit, trials.policy)
-        if _settled(without, left_before, best.bic):
+        if _settled(without, left_before, best.bic, trials.policy):
             # the terms only imitated the differences
             different, settled = without, True
             best, left_after, held = before, left_before, None
@@ -161,14 +158,16 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     )
 
 
-def _settled(different: Differing | None, left: list[Structure], bic: float) -> bool:
+def _settled(
+    different: Differing | None, left: list[Structure], bic: float, policy: Policy
+) -> bool:
     """Return whether separate values of a parameter leave only noise, have a smaller
     BIC than the named terms, and no function common to the recordings promises as much.
     """
     if different is None or not different.complete or different.bic >= bic:
         return False
     common = [one.gain for one in left if one.significant]
-    return max(common, default=0.0) < _AS_MUCH * different.gained
+    return max(common, default=0.0) < policy.as_much * different.gained
 
 
 def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:

@@ -14,12 +14,6 @@ from ..search import Blocks, blocks_of, gain, newton_step
 from ._held_out import rms_of
 
 
-# Number of parameters that are fitted with separate values, those of largest gain
-_FITTED = 3
-# Minimum share of the squared residual above the noise that they must explain
-_LEAST = 0.5
-
-
 class Differing(NamedTuple):
     """A parameter with a separate value for each recording.
 
@@ -72,7 +66,7 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
     half of each recording must improve the prediction of the other half.
 
     **Returns:** `None` if nothing remains above the noise, if there is one recording
-    only, or if no separate values explain at least half of it.
+    only, or if no separate values explain enough of it.
     """
     problem, samples = found.problem, found.problem.samples
     shared = [n for n in found.free if not problem.parameter(n).per_record]
@@ -83,14 +77,14 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
     least = heat * max(number * math.log(samples), float(chi2.isf(chance, number)))
     halves = blocks_of(problem, found.point, 2, found.free)
     gains = {name: _gain(halves, name) for name in shared}
-    promising = sorted(shared, key=lambda name: -gains[name])[:_FITTED]
+    promising = sorted(shared, key=lambda name: -gains[name])[: policy.followed]
     tried = [
         _separated(found, name, policy)
         for name in promising
         if gains[name] > least and _foretold(halves, name) > 0
     ]
     best = max(tried, key=lambda one: one.share, default=None)
-    return best if best is not None and best.share >= _LEAST else None
+    return best if best is not None and best.share >= policy.differs else None
 
 
 def _separated(found: Fit, name: str, policy: Policy) -> Differing:

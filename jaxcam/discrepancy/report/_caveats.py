@@ -5,12 +5,9 @@ import enum
 from collections.abc import Iterator
 
 from ..evidence import Choice, Differing, HeldOut, Outside, Rival, rms_of
+from ..policy import Policy
 from ..search import Question, Trial, Trials
 from ._words import listed, number, percent, quantity, ratio, spelled
-
-
-# Number of recordings up to which their values are listed
-_LISTED = 6
 
 
 class Reason(enum.StrEnum):
@@ -78,16 +75,16 @@ def caveats_of(
             "how they were made.",
         )
     if choice.differing is not None:
-        yield differs(choice.differing)
+        yield differs(choice.differing, trials.policy)
     held = choice.held
     if held.after > trials.policy.as_noise:
         yield above_noise(held, named)
 
 
-def differs(found: Differing) -> Caveat:
+def differs(found: Differing, policy: Policy) -> Caveat:
     """Caveat: a parameter differs from recording to recording."""
     values, unit = found.values, found.unit
-    if len(values) <= _LISTED:
+    if len(values) <= policy.several:
         said = ", ".join(
             f"{name} {number(value, stderr, unit)}"
             for name, value, stderr in zip(found.records, values, found.stderr)

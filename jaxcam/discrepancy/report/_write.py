@@ -184,7 +184,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     if share > policy.decoy:
         yield decoy_explains(share)
     if choice.differing is not None:
-        yield differs(choice.differing)
+        yield differs(choice.differing, policy)
     if left > policy.as_noise:
         yield functions_fall_short(left)
     elif held.after > policy.as_noise:

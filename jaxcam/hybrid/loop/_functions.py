@@ -14,13 +14,11 @@ from ..lowering import (
     joined,
     Memory,
     motion_series,
-    MotionSeries,
     scalarise,
     split,
 )
 from ..runge_kutta import rates_among
 from ..surface import (
-    along_path,
     beyond_shares,
     completion_coefficients,
     field_and_distances,
@@ -33,12 +31,10 @@ from ..surface import (
     heights_rounded,
     impacts,
     impacts_together,
-    InMode,
     joint_rest,
     Jumps,
     least_compliance,
     may_hit_together,
-    motion_rates,
     normal_velocity,
     open_surfaces,
     resets,
@@ -48,7 +44,13 @@ from ..surface import (
     surfaces,
     switched_rounding,
 )
-from ._derived import free_taylor, planar_jet
+from ._derived import (
+    free_taylor,
+    in_mode,
+    negative_sides,
+    nested_series,
+    planar_jet,
+)
 from ._frame import Frame, frame_of, lift_of
 from ._gap_polynomial import Jet
 from ._jumps import jumping_components
@@ -105,7 +107,8 @@ class Functions:
 
             if plain:
                 bound = functools.partial(whole, parameters)
-                return joined(functools.partial(_series, bound) if series else bound)
+                nested = functools.partial(nested_series, bound)
+                return joined(nested if series else bound)
             if series:
                 scalar = motion_series(whole, _ORDERS, shapes, *example)
             else:
@@ -130,7 +133,7 @@ class Functions:
         self._blur = bind(blur, time, state, state)
         if k:
             self._resets = bind(resets, time, state)
-            self._sides = bind(_negative, time, state, whole_field=True)
+            self._sides = bind(negative_sides, time, state, whole_field=True)
             self._open = bind(open_surfaces, time, state)
         if self.slidable:
             self._settled = bind(settled, time, state)
@@ -345,35 +348,8 @@ class Functions:
         return x
 
 
-def _series(function, t, x, *rest) -> MotionSeries:
-    """Return the series of `motion_series` by nested derivatives of arrays."""
-
-    def field(s, y):
-        return function(s, y, *rest)[0]
-
-    rates = motion_rates(field, t, x)
-    along = along_path(lambda s, y: function(s, y, *rest)[1], t, x, rates, 3)
-    return MotionSeries(list(rates), list(along))
-
-
 def _pack(scalars) -> np.ndarray:
     out = np.empty(len(scalars), dtype=object)
     for i, s in enumerate(scalars):
         out[i] = s
     return out
-
-
-def in_mode(function, m: int, jumps: Jumps):
-    """Convert a `function` of a system to one in a given mode, its last argument."""
-
-    def call(system, *arguments):
-        *rest, mode = arguments
-        k = (mode.shape[0] - m) // 2
-        contact, negative, sliding = mode[:m], mode[m : m + k], mode[m + k :]
-        return function(InMode(system, negative, sliding, contact, jumps), *rest)
-
-    return call
-
-
-def _negative(system: SwitchedSystem, t, x):
-    return system.sides(t, x) < 0
