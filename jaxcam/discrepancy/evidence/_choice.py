@@ -119,7 +119,9 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
             different, settled = without, True
             best, left_after, held = before, left_before, None
             inclusion, deviation = redrawn(trials, best, seed)
-            doubtful, needed, beyond = [], [], []
+            needed, beyond = [], []
+    if settled:
+        doubtful = []
     if left and trials.policy.functions and not settled:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed

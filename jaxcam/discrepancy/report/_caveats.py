@@ -67,7 +67,8 @@ def caveats_of(
     apart = [
         s for s in choice.left_after if s.gain > s.threshold and s.predicted_gain <= 0
     ]
-    if apart:
+    explained = choice.differing is not None and choice.differing.complete
+    if apart and not explained:
         yield Caveat(
             Reason.NOT_SHARED,
             "A discrepancy that differs from recording to recording remains "
