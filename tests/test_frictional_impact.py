@@ -14,6 +14,7 @@ from jaxcam.models import SpinningBall
 
 
 KINDS = "kinematic", "kinetic", "energetic"
+ALL_KINDS = *KINDS, "complementarity"
 
 
 def drawn(rng, number: int):
@@ -165,7 +166,25 @@ class Rod(SwitchedSystem):
 STATE = jnp.array([0.0, np.cos(0.6), 0.6, -0.3, -1.0, 0.4])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+def test_the_law_with_the_slip_after_the_impact():
+    """Newton's coefficient and Coulomb's law hold after 2000 impacts, to 1e-12."""
+    *_, side, slip, approach, restitution, rates = drawn(np.random.default_rng(3), 2000)
+    found = impulses(side, slip, approach, restitution, rates, "complementarity")
+    total, positive, negative = map(np.asarray, found)
+    (s1, v1), (s2, v2) = rates
+    after = side * slip + s1 * positive + s2 * negative
+    rebound = approach + v1 * positive + v2 * negative
+    np.testing.assert_allclose(rebound, -restitution * approach, atol=1e-12)
+    np.testing.assert_allclose(total, positive + negative, atol=1e-12)
+    assert np.min(positive) > -1e-12 and np.min(negative) > -1e-12
+    # friction is not fully used only where the slip ends
+    assert np.max(np.abs(after * np.where(after > 0, negative, positive))) < 1e-12
+    holds = (positive > 1e-9) & (negative > 1e-9)
+    reverses = ~holds & (after * side < -1e-9)
+    assert np.sum(holds) > 200 and np.sum(reverses) > 50
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_a_falling_rod(kind):
     """Velocities of the lower end after the impact, to 1e-12."""
     rod = Rod(kind=kind)

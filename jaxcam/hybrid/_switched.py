@@ -125,7 +125,9 @@ class SwitchedSystem(HybridSystem):
         return 1.0
 
     @property
-    def restitution_kind(self) -> Literal["kinematic", "kinetic", "energetic"]:
+    def restitution_kind(
+        self,
+    ) -> Literal["kinematic", "kinetic", "energetic", "complementarity"]:
         """Return the meaning of the coefficient of restitution with contact friction.
 
         `"kinematic"` (Newton, the default): ratio of the normal velocities after and
@@ -133,7 +135,13 @@ class SwitchedSystem(HybridSystem):
         restitution and in compression. `"energetic"` (Stronge): root of the ratio of
         the works of the normal force; only then can an impact never increase the
         energy. They differ if friction changes the normal velocity and the slip stops
-        or reverses during the impact.
+        or reverses during the impact. `"complementarity"` (Moreau): ratio of the normal
+        velocities, and all of the friction acts against the slip after the impact, as
+        in time-stepping schemes; it differs if the slip reverses.
+
+        An impact during contact with other constraints is an impact on all of them:
+        with Newton's coefficient for `"kinematic"` and `"complementarity"`, otherwise
+        with Poisson's.
         """
         return "kinematic"
 

@@ -35,6 +35,7 @@ from ._triple_integrator import TripleIntegrator as TripleIntegrator
 from ._two_sided_stop import TwoSidedStop as TwoSidedStop
 from ._units import rad_s_to_rpm as rad_s_to_rpm, rpm_to_rad_s as rpm_to_rad_s
 from ._valve_train import ValveTrain as ValveTrain
+from ._woodpecker_toy import WoodpeckerToy as WoodpeckerToy
 from .cams import (
     CamProfile as CamProfile,
     EccentricCircle as EccentricCircle,

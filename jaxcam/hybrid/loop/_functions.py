@@ -98,7 +98,7 @@ class Functions:
         self._parameters = jax.tree.map(split, parameters)
         self._memory: Memory | None = None
 
-        def bind(function, *example, whole_field=k == 0, series=False):
+        def bind(function, *example, whole_field=k == 0, series=False, plain=plain):
             if not whole_field:
                 function, example = in_mode(function, m, jumps), (*example, mode)
 
@@ -151,7 +151,9 @@ class Functions:
         if self.rubs:
             self._compliance = bind(least_compliance, time, state)
         if self.joins:
-            self._together = bind(impacts_together, time, state, flags)
+            # with friction, it has a loop
+            loops = plain or self.rubs
+            self._together = bind(impacts_together, time, state, flags, plain=loops)
         if m > 1:
             self._joint_rest = bind(joint_rest, time, state, flags)
 

@@ -25,7 +25,8 @@ def hits_together(
     """Return the impact on all constraints that are reached at the same instant.
 
     Their gaps cannot be distinguished from zero, and they approach. Other closed gaps
-    take part, so that none of them is closed further.
+    take part, so that none of them is closed further. With friction, those in contact
+    take part in every impact, because they may jam.
 
     **Arguments:** which constraint is `hit` first; the `jets` at the end of the step;
     the time of the impact after it, and as a time (s); the state before the impact; and
@@ -46,5 +47,9 @@ def hits_together(
         several = several | (also & ~hit[k])
         closed.append(near | carried.contact[k] | hit[k])
         all_hit[k] = hit[k] | also
+    joins = several
+    if functions.rubs:
+        joins = strikes & (several | any_of(carried.contact))
+        closed = [joins & one for one in closed]
     joint = functions.impacts_together(t, x, closed, carried.mode)
-    return Hits(several, select(several, joint, after), all_hit)
+    return Hits(several, select(joins, joint, after), all_hit)

@@ -6,6 +6,9 @@ piecewise-smooth system in two variables with P as its time (Routh's method): th
 decreases at a constant rate until it is zero; then it remains zero if friction suffices
 (the condition of Filippov for sliding), otherwise it reverses. The chosen
 hypothesis of restitution (Newton, Poisson or Stronge) determines where the impact ends.
+
+The fourth law knows only the velocities after the impact: Newton's coefficient, and all
+friction in the direction of the slip then.
 """
 
 from typing import Any, NamedTuple
@@ -41,11 +44,14 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
     - `side` (+1 or -1) of the slip, and its size `slip` >= 0.
     - `approach`: normal velocity before the impact, negative.
     - `restitution`: the coefficient of restitution.
-    - `kind`: `"kinematic"` (Newton), `"kinetic"` (Poisson) or `"energetic"` (Stronge).
+    - `kind`: `"kinematic"` (Newton), `"kinetic"` (Poisson), `"energetic"` (Stronge) or
+        `"complementarity"` (Moreau).
 
     **References:** W. J. Stronge, Impact Mechanics (2000); J. B.
     Keller, Impact with friction, Journal of Applied Mechanics 53 (1986), 1-4.
     """
+    if kind == "complementarity":
+        return _by_final_slip(side * slip, -(1 + restitution) * approach, rates)
     before = _of_side(side > 0, rates)
     # rate of the size of the slip, and when it ends
     closing = -side * before[0]
@@ -64,6 +70,22 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
     rest = total - start
     positive = jnp.where(side > 0, start, 0.0) + share * rest
     return Impulses(total, positive, total - positive)
+
+
+def _by_final_slip(slip, change, rates: Rates) -> Impulses:
+    """Return the impulses that change the normal velocity by `change`, with friction
+    opposite to the slip after them."""
+    (s1, v1), (s2, v2) = rates
+    ahead, behind = change / v1, change / v2
+    forward = slip + s1 * ahead >= 0
+    backward = slip + s2 * behind <= 0
+    # both velocities are given if it sticks
+    both = jnp.where(forward | backward, 1.0, s2 * v1 - s1 * v2)
+    positive = (change * s2 + slip * v2) / both
+    negative = -(change * s1 + slip * v1) / both
+    positive = jnp.where(forward, ahead, jnp.where(backward, 0.0, positive))
+    negative = jnp.where(forward, 0.0, jnp.where(backward, behind, negative))
+    return Impulses(positive + negative, positive, negative)
 
 
 def _of_side(positive, rates: Rates):

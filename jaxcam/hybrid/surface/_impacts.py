@@ -107,7 +107,7 @@ def _with_friction(
     directions, coefficients = _law(system, t, x, before, after)
     rows = []
     for k, direction in enumerate(directions):
-        one = _one_contact(system, t, x, k, sides, direction)
+        one = contact_at(system, t, x, k, sides, direction)
         found = impulses(
             one.side, one.slip, before[k], coefficients[k], one.rates, kind
         )
@@ -147,19 +147,20 @@ def _slow_coefficient(system, t, x, k: int, direction):
     return -jax.jvp(frictionless, (x,), (direction,))[1]
 
 
-class _Contact(NamedTuple):
-    """The slip at one contact: its side and size, and the friction during positive and
-    negative slip `(n,)`.
+class Contact(NamedTuple):
+    """The slip at one contact: its side and size, and its switching function; and the
+    friction during positive and negative slip `(n,)`.
     """
 
     side: Any
     slip: Any
+    surface: Any
     positive: State
     negative: State
     rates: Rates
 
 
-def _one_contact(system, t, x, k: int, sides, direction) -> _Contact:
+def contact_at(system, t, x, k: int, sides, direction) -> Contact:
     """Find the switching function on which the friction of constraint `k` depends."""
     same = friction_on(system, t, x, sides)[k]
     # without one, friction never changes
@@ -186,4 +187,4 @@ def _one_contact(system, t, x, k: int, sides, direction) -> _Contact:
             for part in (positive, negative)
         )
     )
-    return _Contact(side, slip, positive, negative, rates)
+    return Contact(side, slip, place, positive, negative, rates)

@@ -1,8 +1,8 @@
 """Impacts at several constraints at the same instant.
 
-The impulses p of all constraints act together, in compression and then in restitution
-(Poisson's law). With the normal velocities v and the matrix G of their changes by the
-impulses:
+The impulses of all constraints act together, in compression and then in restitution
+(Poisson's law). Without friction, with the normal velocities v and the matrix G of
+their changes by the impulses p:
 
 - compression ends with v' = v + G p >= 0, p >= 0, one of both zero at each constraint
   (a linear complementarity problem): no gap closes any more;
@@ -15,24 +15,27 @@ constraints that influence each other, e p might return more than was lost. It i
 reduced to the part that returns the square of the largest coefficient, so that impacts
 never create energy. (C. Glocker, F. Pfeiffer, Multiple impacts with friction in rigid
 multibody systems, Nonlinear Dynamics 7, 1995)
+
+`_frictional_impacts_together.py` is for contacts with friction.
 """
 
 import jax
-import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
 from ._complementary import complementary
 from ._contact_friction import has_friction
+from ._frictional_impacts_together import frictional_impacts_together, FrictionlessLaw
 from ._impacts import frictionless_law
 from ._normal import normal_velocity
+from ._restitution_bound import restitution_bound
 
 
-# more constraints than this hit one after the other: there are 2^m active sets
+# more constraints than this hit one after the other: there are 2^m active sets, with
+# friction 4^m
 MOST_TOGETHER = 4
-# coefficients of influence below this are rounding
-_UNCOUPLED = 1e-12
+MOST_WITH_FRICTION = 3
 
 
 def may_hit_together(system: HybridSystem, states: int, number: int) -> bool:
@@ -43,8 +46,8 @@ def may_hit_together(system: HybridSystem, states: int, number: int) -> bool:
 
     **Arguments:** the system, its number of states, and its number of constraints.
     """
-    few = 1 < number <= MOST_TOGETHER
-    return few and states > 3 and not has_friction(system)
+    most = MOST_WITH_FRICTION if has_friction(system) else MOST_TOGETHER
+    return 1 < number <= most and states > 3
 
 
 def impacts_together(
@@ -53,7 +56,7 @@ def impacts_together(
     """Return the state after an impact at all `closed` constraints that approach.
 
     Args:
-        system: A system without contact friction.
+        system: The system.
         t: Time (s).
         x: State just before the impact, shape `(n,)`.
         closed: Which gaps are closed, in contact or not, shape `(m,)`.
@@ -64,6 +67,9 @@ def impacts_together(
     before = normal_velocity(system, t, x)
     slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     directions, coefficients = frictionless_law(system, t, x)
+    if has_friction(system):
+        law = FrictionlessLaw(before, slope, directions, coefficients)
+        return frictional_impacts_together(system, t, x, closed, law)
     total = joint_impulses(slope @ directions.T, before, coefficients, closed)
     return x + total @ directions
 
@@ -74,7 +80,8 @@ def joint_impulses(
     coefficients: Float[Array, " m"],
     closed: Bool[Array, " m"],
 ) -> Float[Array, " m"]:
-    """Return the impulses, each in units of the change of its own normal velocity.
+    """Return the impulses without friction, each in units of the change of its own
+    normal velocity.
 
     **Arguments:** the changes of the normal velocities by unit impulses, with a
     diagonal of one; the normal velocities before the impact; the coefficients of
@@ -82,65 +89,6 @@ def joint_impulses(
     """
     pressed = complementary(matrix, before, closed)
     back = coefficients * pressed
-    back = back * _bound(matrix, pressed, back, coefficients)
+    back = back * restitution_bound(matrix, before, pressed, back, coefficients)
     after = before + matrix @ (pressed + back)
     return pressed + back + complementary(matrix, after, closed)
-
-
-def _bound(matrix, pressed, back, coefficients):
-    """Return the factor, up to one, by which the energy limits each restitution."""
-    number = pressed.shape[0]
-    ratios, coupled = _metric(matrix)
-    factors = []
-    for i in range(number):
-        # energies in a common unit, of the constraints that influence each other
-        weights = [jnp.where(coupled[i][a], ratios[i][a], 0.0) for a in range(number)]
-        stored, returned = (
-            sum(
-                weights[a] * part[a] * matrix[a, b] * part[b]
-                for a in range(number)
-                for b in range(number)
-            )
-            for part in (pressed, back)
-        )
-        largest = jnp.zeros_like(pressed[0])
-        for a in range(number):
-            counts = coupled[i][a] & (pressed[a] > 0)
-            largest = jnp.where(counts, jnp.maximum(largest, coefficients[a]), largest)
-        most = largest * largest * stored
-        exceeds = returned > most
-        share = most / jnp.where(exceeds, returned, 1.0)
-        positive = exceeds & (share > 0)
-        root = jnp.sqrt(jnp.where(positive, share, 1.0))
-        factors.append(jnp.where(exceeds & ~positive, 0.0, root))
-    return jnp.stack(factors)
-
-
-def _metric(matrix):
-    """Return the ratios of the inverse masses of the constraints, and which influence
-    each other, if only through others.
-
-    The matrix is symmetric but for these masses: G_ab / m_a = G_ba / m_b.
-    """
-    number = matrix.shape[0]
-    every = range(number)
-    ratios, coupled = [], []
-    for i in every:
-        row, flags = [], []
-        for k in every:
-            flag = jnp.abs(matrix[i, k] * matrix[k, i]) > _UNCOUPLED**2
-            flag = flag | (i == k)
-            row.append(matrix[i, k] / jnp.where(flag, matrix[k, i], 1.0))
-            flags.append(flag)
-        ratios.append(row)
-        coupled.append(flags)
-    for through in every:
-        for i in every:
-            for k in every:
-                if through in (i, k) or i == k:
-                    continue
-                path = coupled[i][through] & coupled[through][k] & ~coupled[i][k]
-                longer = ratios[i][through] * ratios[through][k]
-                ratios[i][k] = jnp.where(path, longer, ratios[i][k])
-                coupled[i][k] = coupled[i][k] | path
-    return ratios, coupled

@@ -1,0 +1,96 @@
+"""Impacts with Coulomb friction at several contacts at the same instant.
+
+With Poisson's coefficient, an impact consists of the three steps described in
+`_impacts_together.py`; each of them fulfils Coulomb's law at all contacts, with the
+slip velocities at its end. With Newton's coefficient, there is one step: v' + e v takes
+the place of v', where v is the approach velocity before the impact, and the friction
+opposes the slip after it. (J. J. Moreau, Unilateral contact and dry friction in finite
+freedom dynamics, 1988; C. Glocker, F. Pfeiffer, Multiple impacts with friction in rigid
+multibody systems, Nonlinear Dynamics 7, 1995)
+
+Compression alone never creates energy. What restitution adds to it is reduced, if
+necessary, until an impact does not create energy either.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from .._types import State
+from ._contact_friction import restitution_kind, sides_of, surfaces_of
+from ._coulomb_contacts import contact_impulses
+from ._impacts import contact_at
+from ._restitution_bound import restitution_bound
+
+
+class FrictionlessLaw(NamedTuple):
+    """The normal velocities, their derivatives by the state, and the directions and
+    coefficients of restitution of impacts without friction.
+    """
+
+    velocities: Float[Array, " m"]
+    slope: Float[Array, "m n"]
+    directions: Float[Array, "m n"]
+    coefficients: Float[Array, " m"]
+
+
+def frictional_impacts_together(
+    system, t, x, closed: Bool[Array, " m"], law: FrictionlessLaw
+) -> State:
+    """Return the state after the impact with friction at all closed contacts."""
+    before, slope, directions, coefficients = law
+    rubbing = _rubbing(system, t, x, directions)
+    normals = directions + rubbing.pushes
+    columns = jnp.concatenate([rubbing.transfers, normals])
+    rows = jnp.concatenate([rubbing.gradients, slope])
+    velocities = jnp.concatenate([rubbing.slips, before])
+    matrix, number = rows @ columns.T, len(before)
+
+    pressed = contact_impulses(matrix, velocities, closed)
+    between = velocities + matrix @ pressed
+    if restitution_kind(system) in ("kinematic", "complementarity"):
+        bounce = coefficients * jnp.minimum(before, 0.0)
+        wanted = jnp.concatenate([rubbing.slips, before + bounce])
+        back = contact_impulses(matrix, wanted, closed) - pressed
+    else:
+        normal = coefficients * pressed[number:]
+        back = contact_impulses(matrix, between, closed, normal)
+    # the energy is that of friction and normal impulses, each in its own direction
+    apart = rows @ jnp.concatenate([rubbing.transfers, directions]).T
+    along = jnp.sum(rubbing.gradients * rubbing.pushes, axis=1)
+    along = jnp.concatenate([along, jnp.zeros_like(before)])
+    down, up = (part + along * jnp.tile(part[number:], 2) for part in (pressed, back))
+    bounds = restitution_bound(apart, velocities, down, up, jnp.ones(2 * number))
+    back = jnp.min(bounds) * back
+    last = contact_impulses(matrix, between + matrix @ back, closed)
+    return x + (pressed + back + last) @ columns
+
+
+class _Rubbing(NamedTuple):
+    """The slip velocities, their derivatives by the state, the friction during positive
+    slip, and its change from positive to negative slip, of each contact.
+
+    The unit of a slip velocity is its change by that change of friction; it is zero
+    without friction.
+    """
+
+    slips: Float[Array, " m"]
+    gradients: Float[Array, "m n"]
+    pushes: Float[Array, "m n"]
+    transfers: Float[Array, "m n"]
+
+
+def _rubbing(system, t, x, directions) -> _Rubbing:
+    sides = sides_of(system, t, x)
+    contacts = [contact_at(system, t, x, k, sides, d) for k, d in enumerate(directions)]
+    places = jnp.stack([one.surface for one in contacts])
+    pushes = jnp.stack([one.positive for one in contacts])
+    transfers = jnp.stack([one.negative for one in contacts]) - pushes
+    slips = surfaces_of(system, t, x)[places]
+    gradients = jax.jacfwd(lambda y: surfaces_of(system, t, y))(x)[places]
+    unit = jnp.sum(gradients * transfers, axis=1)
+    rubs = unit > 0
+    scale = jnp.where(rubs, 1 / jnp.where(rubs, unit, 1.0), 0.0)
+    return _Rubbing(scale * slips, scale[:, None] * gradients, pushes, transfers)
