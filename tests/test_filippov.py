@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+import continuation
+import jaxcam
 from jaxcam.filippov import (
     equivalent_control,
     filippov_flow,
@@ -211,6 +213,23 @@ def test_relay_by_steps_and_by_events():
     assert np.max(np.abs(rates - 1)) < 0.15
 
 
+def test_the_main_loop_simulates_filippov_systems():
+    """The same crossings, sliding phases and states, to 1e-7 s."""
+    plant = np.array([[0.0, 1.0], [-1.0, -0.2]])
+    for system, start, end in (
+        (BeltOscillator(), [1.0, 0.0], 20.0),
+        (RelayFeedback(plant, [0.0, 0.4], [0.5, 1.0]), [2.0, 0.0], 6.0),
+        (RelayFeedback(PLANT, INPUT, OUTPUT), [1.0, 0.0, 0.0], 80.0),
+    ):
+        expected = simulate_filippov(system, start, 0.0, end)
+        run = jaxcam.simulate(system, start, 0.0, end)
+        assert run.successful, run.result
+        assert int(run.switches.count) == expected.switches.count
+        time = np.asarray(run.switches.time)[: expected.switches.count]
+        assert largest(time, expected.switches.time) < 1e-7
+        assert largest(run.final, expected.final) < 1e-7
+
+
 # Derivatives.
 
 
@@ -256,6 +275,17 @@ def test_multipliers_with_sliding_agree_with_differences(forced):
     assert np.max(np.abs(found - direct)) < 1e-6
     # sliding leaves a zero
     assert found[0] < 1e-9
+
+
+def test_a_periodic_orbit_of_the_main_loop(forced):
+    """The same orbit and multipliers as above, to 1e-6, as one that can be followed."""
+    system, state = forced
+    orbit = continuation.periodic_orbit(system, state, periods=1)
+    assert [event.kind for event in orbit.signature].count("slide") == 1
+    run = simulate_filippov(system, state, 0.0, float(system.period), tolerance=1e-12)
+    expected = np.linalg.eigvals(np.asarray(filippov_monodromy(run)))
+    found = np.sort(np.abs(np.asarray(orbit.multipliers)))
+    assert largest(found, np.sort(np.abs(expected))) < 1e-6
 
 
 @pytest.mark.slow

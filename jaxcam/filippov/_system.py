@@ -1,24 +1,25 @@
 """Filippov systems, with one vector field on either side of a surface."""
 
 import abc
-from typing import Any, ClassVar
 
-import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..hybrid import SwitchedSystem
 
-class FilippovSystem(eqx.Module):
+
+class FilippovSystem(SwitchedSystem):
     """A system whose vector field jumps across a surface (thesis, eq. 2.19).
 
     Subclass it and define the three methods below, which must be smooth in time and
     state, even beyond the surface. Every floating-point field is a parameter. The state
-    never jumps. In a [`jaxcam.hybrid.HybridSystem`][], by contrast, the surface is
-    never crossed, and contact imposes two conditions on the state (gap and normal
-    velocity) and begins with an impact. Here, the motion can be on both sides, and
-    sliding imposes one condition. The two kinds therefore have separate event loops.
+    never jumps.
+
+    It is a [`jaxcam.hybrid.SwitchedSystem`][] with one surface: `jaxcam.simulate`,
+    stroboscopes, basins, periodic orbits and branches accept it.
 
     Examples:
-        >>> from jaxcam.filippov import FilippovSystem, simulate_filippov
+        >>> from jaxcam.filippov import FilippovSystem
         >>> class Relay(FilippovSystem):
         ...     def above(self, t, state):
         ...         return -jnp.ones(1)
@@ -26,14 +27,9 @@ class FilippovSystem(eqx.Module):
         ...         return jnp.ones(1)
         ...     def switching(self, t, state):
         ...         return state[0]
-        >>> round(float(simulate_filippov(Relay(), [0.5], 0.0, 1.0).final[0]), 6) + 0.0
+        >>> round(float(jaxcam.simulate(Relay(), [0.5], 0.0, 1.0).final[0]), 6) + 0.0
         0.0
     """
-
-    state_names: ClassVar[tuple[str, ...]] = ()
-    """Names of the state components."""
-    state_units: ClassVar[tuple[str, ...]] = ()
-    """Units of the state components."""
 
     @abc.abstractmethod
     def above(self, t, state: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -47,11 +43,6 @@ class FilippovSystem(eqx.Module):
     def switching(self, t, state: Float[Array, " n"]) -> Float[Array, ""]:
         """Return the scalar H that is zero on the surface."""
 
-    @property
-    def period(self) -> Any:
-        """Period of the forcing (s), or `None` for an autonomous system."""
-        return None
-
-    def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
-        return None
+    def branch(self, t, state: Float[Array, " n"], sides) -> Float[Array, " n"]:
+        """Return `above` or `below`, shape `(n,)`."""
+        return jnp.where(sides[0] > 0, self.above(t, state), self.below(t, state))

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..lowering import is_known, join_known
+from ..lowering import is_known, join_known, rearranged
 from ._elementwise import elementwise
 from ._writer import Lacking, Writer
 
@@ -42,7 +42,7 @@ def moved(equation, inputs) -> list[np.ndarray]:
 
     Operands that are indices must be known.
     """
-    simple = _plainly_moved(equation, inputs)
+    simple = rearranged(equation, inputs)
     if simple is not None:
         return [simple]
     numbers = _indices_of(equation.primitive.name, len(inputs))
@@ -72,31 +72,6 @@ def moved(equation, inputs) -> list[np.ndarray]:
         out.ravel()[:] = table[places.ravel()]
         found.append(out)
     return found
-
-
-@no_type_check
-def _plainly_moved(equation, inputs):
-    """Return the result of common rearrangements, using only numpy; otherwise
-    `None`.
-    """
-    name, params, first = equation.primitive.name, equation.params, inputs[0]
-    if name in ("reshape", "squeeze", "expand_dims", "copy"):
-        return first.reshape(equation.outvars[0].aval.shape)
-    if name == "slice":
-        strides = params["strides"] or (1,) * first.ndim
-        cuts = zip(params["start_indices"], params["limit_indices"], strides)
-        return first[tuple(slice(*c) for c in cuts)]
-    if name == "concatenate":
-        return np.concatenate(inputs, axis=params["dimension"])
-    if name == "transpose":
-        return first.transpose(params["permutation"])
-    if name == "broadcast_in_dim":
-        shape, kept = params["shape"], params["broadcast_dimensions"]
-        sizes = [1] * len(shape)
-        for axis, dimension in enumerate(kept):
-            sizes[dimension] = first.shape[axis]
-        return np.broadcast_to(first.reshape(sizes), shape)
-    return None
 
 
 def _fill(equation):

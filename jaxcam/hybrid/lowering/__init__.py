@@ -19,6 +19,7 @@ from ._motion_series import (
     motion_series as motion_series,
     MotionSeries as MotionSeries,
 )
+from ._moves import rearranged as rearranged
 from ._one_kernel import one_kernel as one_kernel
 from ._packing import pack as pack, Packed as Packed
 from ._scalarise import joined as joined, scalarise as scalarise

@@ -1,5 +1,7 @@
 """Operations that only move the elements of an array."""
 
+from typing import no_type_check
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -25,16 +27,20 @@ MOVES = frozenset(
 """Their names."""
 
 
-def moved(equation, inputs, memory):
-    """Return the moved elements, found by applying the operation to indices."""
-    first, others = inputs[0], [join_known(i) for i in inputs[1:]]
-    name, params = equation.primitive.name, equation.params
-    if name in ("reshape", "squeeze"):
+@no_type_check
+def rearranged(equation, inputs) -> np.ndarray | None:
+    """Return the result of common rearrangements, using only numpy; otherwise
+    `None`.
+    """
+    name, params, first = equation.primitive.name, equation.params, inputs[0]
+    if name in ("reshape", "squeeze", "expand_dims", "copy"):
         return first.reshape(equation.outvars[0].aval.shape)
     if name == "slice":
         strides = params["strides"] or (1,) * first.ndim
         cuts = zip(params["start_indices"], params["limit_indices"], strides)
         return first[tuple(slice(*c) for c in cuts)]
+    if name == "concatenate":
+        return np.concatenate(inputs, axis=params["dimension"])
     if name == "transpose":
         return first.transpose(params["permutation"])
     if name == "broadcast_in_dim":
@@ -43,6 +49,16 @@ def moved(equation, inputs, memory):
         for axis, dimension in enumerate(kept):
             sizes[dimension] = first.shape[axis]
         return np.broadcast_to(first.reshape(sizes), shape).copy()
+    return None
+
+
+def moved(equation, inputs, memory):
+    """Return the moved elements, found by applying the operation to indices."""
+    simple = rearranged(equation, inputs)
+    if simple is not None:
+        return simple
+    first, others = inputs[0], [join_known(i) for i in inputs[1:]]
+    params = equation.params
     indices = np.arange(first.size, dtype=np.int64).reshape(first.shape)
     with jax.ensure_compile_time_eval():
         target = np.asarray(
