@@ -98,7 +98,7 @@ class Functions:
         self._parameters = jax.tree.map(split, parameters)
         self._memory: Memory | None = None
 
-        def bind(function, *example, whole_field=k == 0, series=False, plain=plain):
+        def bind(function, *example, whole_field=k == 0, series=False):
             if not whole_field:
                 function, example = in_mode(function, m, jumps), (*example, mode)
 
@@ -151,9 +151,7 @@ class Functions:
         if self.rubs:
             self._compliance = bind(least_compliance, time, state)
         if self.joins:
-            # with friction, it has a loop
-            loops = plain or self.rubs
-            self._together = bind(impacts_together, time, state, flags, plain=loops)
+            self._together = bind(impacts_together, time, state, flags)
         if m > 1:
             self._joint_rest = bind(joint_rest, time, state, flags)
 

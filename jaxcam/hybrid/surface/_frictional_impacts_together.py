@@ -40,32 +40,54 @@ def frictional_impacts_together(
     system, t, x, closed: Bool[Array, " m"], law: FrictionlessLaw
 ) -> State:
     """Return the state after the impact with friction at all closed contacts."""
-    before, slope, directions, coefficients = law
-    rubbing = _rubbing(system, t, x, directions)
-    normals = directions + rubbing.pushes
-    columns = jnp.concatenate([rubbing.transfers, normals])
-    rows = jnp.concatenate([rubbing.gradients, slope])
-    velocities = jnp.concatenate([rubbing.slips, before])
-    matrix, number = rows @ columns.T, len(before)
+    rubbing = _rubbing(system, t, x, law.directions)
+    columns = jnp.concatenate([rubbing.transfers, law.directions + rubbing.pushes])
+    rows = jnp.concatenate([rubbing.gradients, law.slope])
+    sent = (
+        rows @ columns.T,
+        rows @ jnp.concatenate([rubbing.transfers, law.directions]).T,
+        jnp.sum(rubbing.gradients * rubbing.pushes, axis=1),
+        jnp.concatenate([rubbing.slips, law.velocities]),
+        law.coefficients,
+        closed,
+    )
+    newton = restitution_kind(system) in ("kinematic", "complementarity")
+    # in a loop of one turn, the arrays are not split into scalars, of which there would
+    # be thousands
+    _, found = jax.lax.scan(
+        lambda _, __: (None, _impulses(*sent, newton)), None, None, length=1
+    )
+    return x + found[0] @ columns
 
+
+def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bool):
+    """Return the impulses of all contacts, as those of `contact_impulses`.
+
+    **Arguments:**
+
+    - `matrix`, `velocities` and `closed`, as for `contact_impulses`.
+    - `apart`: the matrix for impulses of friction and normal impulses, each in its own
+        direction; and `along`, the friction during positive slip in units of the
+        transfer.
+    - `newton`: whether the `coefficients` are Newton's, otherwise Poisson's.
+    """
+    number = len(closed)
     pressed = contact_impulses(matrix, velocities, closed)
     between = velocities + matrix @ pressed
-    if restitution_kind(system) in ("kinematic", "complementarity"):
+    before = velocities[number:]
+    if newton:
         bounce = coefficients * jnp.minimum(before, 0.0)
-        wanted = jnp.concatenate([rubbing.slips, before + bounce])
+        wanted = velocities.at[number:].add(bounce)
         back = contact_impulses(matrix, wanted, closed) - pressed
     else:
         normal = coefficients * pressed[number:]
         back = contact_impulses(matrix, between, closed, normal)
-    # the energy is that of friction and normal impulses, each in its own direction
-    apart = rows @ jnp.concatenate([rubbing.transfers, directions]).T
-    along = jnp.sum(rubbing.gradients * rubbing.pushes, axis=1)
+    # the energy is that of friction and normal impulses
     along = jnp.concatenate([along, jnp.zeros_like(before)])
     down, up = (part + along * jnp.tile(part[number:], 2) for part in (pressed, back))
     bounds = restitution_bound(apart, velocities, down, up, jnp.ones(2 * number))
     back = jnp.min(bounds) * back
-    last = contact_impulses(matrix, between + matrix @ back, closed)
-    return x + (pressed + back + last) @ columns
+    return pressed + back + contact_impulses(matrix, between + matrix @ back, closed)
 
 
 class _Rubbing(NamedTuple):
