@@ -213,26 +213,52 @@ def _without_a_name(
         return None, None, ()
     problem = question.problem
     positions, velocities, approach, duration = visited_states(problem).ranges(policy)
-    search = FreeSearch(
-        problem,
-        question.rig,
-        question.terms,
-        families(
-            positions,
-            velocities,
-            approach,
-            duration,
-            turned=question.turned,
-            impacting=any(len(part.impacts.approach) for part in problem.segments),
-            slip=question.references.slip_speed,
-            motion_unit=question.unit,
-        ),
-        policy,
-        trials.progress,
-        bare,
+    offered = families(
+        positions,
+        velocities,
+        approach,
+        duration,
+        turned=question.turned,
+        impacting=any(len(part.impacts.approach) for part in problem.segments),
+        slip=question.references.slip_speed,
+        motion_unit=question.unit,
     )
-    found = search.run()
-    while found is not None and found.functions and found.score < best.bic:
+    chosen: Missing | None = None
+    needed: Needs | None = None
+    tried: list[Missing] = []
+    # elements with an internal state only if functions do not suffice
+    for elements in (True,) if policy.elements > 1 else (False, True):
+        search = FreeSearch(
+            problem,
+            question.rig,
+            question.terms,
+            offered,
+            policy,
+            trials.progress,
+            bare,
+            elements,
+        )
+        found, its_needs = _needed(search, search.run(), best.bic, seed)
+        tried += search.tried
+        if found is not None and (chosen is None or found.score < chosen.score):
+            chosen, needed = found, its_needs
+        if elements or not search.lacks_element(found):
+            break
+    if chosen is None:
+        return None, None, ()
+    return chosen, needed, rivals(chosen, tried, policy, seed)
+
+
+def _needed(
+    search: FreeSearch, found: Missing | None, bic: float, seed: int
+) -> tuple[Missing | None, Needs | None]:
+    """Drop functions and terms that the bootstrap samples do not retain.
+
+    **Returns:** the fit with the others, and their bootstrap results; `None` if none is
+    left or their score is not below `bic`.
+    """
+    policy = search.policy
+    while found is not None and found.functions and found.score < bic:
         parts, prices = search.fits.parts(found), search.fits.prices(found)
         fitted = found.fit
         needed = needs(
@@ -240,12 +266,11 @@ def _without_a_name(
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
         if needed.inclusion[least] >= policy.sure:
-            others = rivals(found, search.tried, policy, seed)
-            return found._replace(decoys=search.decoys(found)), needed, others
+            return found._replace(decoys=search.decoys(found)), needed
         if len(parts) < 2:
             break
         found = search.without(found, least)
-    return None, None, ()
+    return None, None
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

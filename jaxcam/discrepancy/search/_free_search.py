@@ -37,8 +37,8 @@ class FreeSearch:
     """Adds functions and terms one by one, as long as the evidence increases.
 
     **Arguments:** the problem, names of the rig parameters, candidate terms, families
-    of functions, the policy, `progress(sentence, fraction)`, and the cost of the model
-    without any of them.
+    of functions, the policy, `progress(sentence, fraction)`, the cost of the model
+    without any of them, and whether elements with an internal state are candidates.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class FreeSearch:
         policy: Policy,
         progress: Callable[[str, float | None], None],
         cost: float,
+        elements: bool = False,
     ):
         self.cost = cost
         self.policy, self.progress = policy, progress
@@ -58,17 +59,17 @@ class FreeSearch:
         self.families = tuple(families)
         # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
-        # candidates for the first function
+        # candidates for the first function, and the fit about which they were ranked
         self.first: list[Lead] = []
+        self.before: tuple[Problem, Missing] | None = None
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
-        self.driven = driven_by(problem, unit) if policy.elements else None
-        self.problem = roomy(problem, self.families[0], impacting, self.driven)
+        self.driven = driven_by(problem, unit) if elements or policy.elements else None
+        room = self.driven if elements else None
+        self.problem = roomy(problem, self.families[0], impacting, room)
         # gain, offset and lag of a sensor are not unnamed functions
         faults = own_faults(self.problem.model, self.problem.parameters)
-        self.leads = Leads(
-            self.fits, self.families, self.driven, faults, policy, progress
-        )
+        self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
@@ -130,6 +131,28 @@ class FreeSearch:
         self.progress(f"fitting {lead.label} instead", None)
         return self._with(self.problem, bare, lead)
 
+    def lacks_element(self, found: Missing | None) -> bool:
+        """Return whether an element with an internal state might explain more than
+        the functions found.
+
+        Its gain is predicted like those of the functions, before any of them was added,
+        and must be comparable with the largest of them. If a residual is left, a
+        smaller gain suffices, or a gain in addition to the functions.
+        """
+        if self.driven is None or self.before is None:
+            return False
+        best = max((lead.gain for lead in self.first), default=0.0)
+        promised = self.leads.of_elements(*self.before, self.driven)
+        if found is not None and leaves_noise(self.fits, found, self._small(found)):
+            return promised > max(self._least(), self.policy.rivalling * best)
+        if promised > max(self._least(), self.policy.promising * best):
+            return True
+        if found is None:
+            return False
+        small = self._small(found) / heat_of(found.fit)
+        promised = self.leads.of_elements(self.problem, found, self.driven)
+        return promised > max(self._least(), small)
+
     def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
         """Return the labels of functions, and the fractions that their decoys gain."""
         labels = {one.label for one in found.functions}
@@ -155,7 +178,8 @@ class FreeSearch:
                 # single pieces contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
-            self.first = self.first or leads
+            if not self.first:
+                self.first, self.before = leads, (problem, found)
             best = found
             for lead in leads:
                 if self._done(best, lead, leads[0]):
