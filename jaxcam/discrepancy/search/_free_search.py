@@ -16,6 +16,7 @@ from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
 from ._blocks import blocks_of, values_of
+from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._gains import added_gain, gain
@@ -59,13 +60,13 @@ class FreeSearch:
         self.families = tuple(families)
         # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
-        # candidates for the first function, and the fit about which they were ranked
+        # candidates for the first function
         self.first: list[Lead] = []
-        self.before: tuple[Problem, Missing] | None = None
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
-        self.driven = driven_by(problem, unit) if elements or policy.elements else None
-        room = self.driven if elements else None
+        driven = driven_by(problem, unit) if elements or policy.elements else None
+        room, left = (driven, None) if elements else (None, driven)
+        self.need = ElementNeed(self.fits, left, policy)
         self.problem = roomy(problem, self.families[0], impacting, room)
         # gain, offset and lag of a sensor are not unnamed functions
         faults = own_faults(self.problem.model, self.problem.parameters)
@@ -75,12 +76,19 @@ class FreeSearch:
         )
 
     def run(self) -> Missing | None:
-        """Return the functions and terms found, or `None` if none is significant."""
+        """Return the functions and terms found, or `None` if none is significant.
+
+        The search ends as soon as an element is preferred that is not a candidate.
+        """
         bare = self._bare(self.apart, self.problem.start)
         found = self._grown(bare, True)
+        if self.need.preferred:
+            return None
         most = self.policy.iterations
         found = self.fits.fitted(self._tight(found), found.fit.point, most)
         found = self._grown(found, False)
+        if self.need.preferred:
+            return None
         swapped = self._swapped(found)
         if swapped is not found:
             found = self._grown(swapped, False)
@@ -132,26 +140,18 @@ class FreeSearch:
         return self._with(self.problem, bare, lead)
 
     def lacks_element(self, found: Missing | None) -> bool:
-        """Return whether an element with an internal state might explain more than
-        the functions found.
+        """Return whether to repeat the search with elements among the candidates.
 
-        Its gain is predicted like those of the functions, before any of them was added,
-        and must be comparable with the largest of them. If a residual is left, a
-        smaller gain suffices, or a gain in addition to the functions.
+        This is the case if one is preferred to every function, or if the functions
+        leave a residual that one may explain.
         """
-        if self.driven is None or self.before is None:
-            return False
-        best = max((lead.gain for lead in self.first), default=0.0)
-        promised = self.leads.of_elements(*self.before, self.driven)
-        if found is not None and leaves_noise(self.fits, found, self._small(found)):
-            return promised > max(self._least(), self.policy.rivalling * best)
-        if promised > max(self._least(), self.policy.promising * best):
+        if self.need.preferred:
             return True
-        if found is None:
+        small = 0.0 if found is None else self._small(found)
+        if found is not None and leaves_noise(self.fits, found, small):
             return False
-        small = self._small(found) / heat_of(found.fit)
-        promised = self.leads.of_elements(self.problem, found, self.driven)
-        return promised > max(self._least(), small)
+        heat = 1.0 if found is None else heat_of(found.fit)
+        return self.need.remains(self.problem, found, max(self._least(), small / heat))
 
     def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
         """Return the labels of functions, and the fractions that their decoys gain."""
@@ -179,7 +179,11 @@ class FreeSearch:
                 break
             leads = self._leads(problem, found, apart)
             if not self.first:
-                self.first, self.before = leads, (problem, found)
+                self.first = leads
+                gains = [lead.gain for lead in leads]
+                self.need.compare(problem, found, gains, self._least())
+                if self.need.preferred:
+                    break
             best = found
             for lead in leads:
                 if self._done(best, lead, leads[0]):
