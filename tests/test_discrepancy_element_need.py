@@ -6,17 +6,21 @@ import pytest
 
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search._element_need import ElementNeed
+from jaxcam.discrepancy.search._free_fits import FreeFits, Missing
+from jaxcam.fitting import Problem
 
 
 _LEAST = 24.0
-_NONE = cast(Any, None)  # problem and fit, which the predictions below do not use
+# what the predictions below do not use
+_PROBLEM = object.__new__(Problem)
+_FIT = Missing((), frozenset(), cast(Any, None), 0.0, _PROBLEM)
 
 
 class _Predicted(ElementNeed):
     """Elements whose gain is given, before and after functions are added."""
 
     def __init__(self, before, after=0.0):
-        super().__init__(_NONE, None, Policy())
+        super().__init__(FreeFits((), (), Policy()), None, Policy())
         self.each = [before, after]
 
     def _promised(self, problem, found):
@@ -38,21 +42,21 @@ def test_an_element_is_compared_with_the_functions(
     promised, functions, preferred, comparable
 ):
     need = _Predicted(promised)
-    need.compare(_NONE, _NONE, functions, _LEAST)
+    need.compare(_PROBLEM, _FIT, functions, _LEAST)
     assert (need.preferred, need.comparable) == (preferred, comparable)
     # nothing was found: an element is tried if it was comparable
-    assert need.remains(_NONE, None, _LEAST) == comparable
+    assert need.remains(_PROBLEM, None, _LEAST) == comparable
 
 
 @pytest.mark.parametrize(("after", "needed"), [(20.0, False), (30.0, True)])
 def test_an_element_may_explain_what_functions_leave(after, needed):
     need = _Predicted(10.0, after)
-    need.compare(_NONE, _NONE, [1000.0], _LEAST)
-    assert need.remains(_NONE, cast(Any, object()), _LEAST) == needed
+    need.compare(_PROBLEM, _FIT, [1000.0], _LEAST)
+    assert need.remains(_PROBLEM, _FIT, _LEAST) == needed
 
 
 def test_an_element_that_is_no_candidate_promises_nothing():
-    need = ElementNeed(_NONE, None, Policy(elements=0))
-    need.compare(_NONE, _NONE, [], _LEAST)
+    need = ElementNeed(FreeFits((), (), Policy()), None, Policy(elements=0))
+    need.compare(_PROBLEM, _FIT, [], _LEAST)
     assert not need.preferred
-    assert not need.remains(_NONE, None, _LEAST)
+    assert not need.remains(_PROBLEM, None, _LEAST)
