@@ -223,11 +223,8 @@ def _without_a_name(
         slip=question.references.slip_speed,
         motion_unit=question.unit,
     )
-    chosen: Missing | None = None
-    needed: Needs | None = None
-    tried: list[Missing] = []
-    # elements with an internal state only if functions do not suffice
-    for elements in (True,) if policy.elements > 1 else (False, True):
+
+    def searched(elements: bool, policy: Policy = policy):
         search = FreeSearch(
             problem,
             question.rig,
@@ -238,15 +235,24 @@ def _without_a_name(
             bare,
             elements,
         )
-        found, its_needs = _needed(search, search.run(), best.bic, seed)
-        tried += search.tried
-        if found is not None and (chosen is None or found.score < chosen.score):
-            chosen, needed = found, its_needs
-        if elements or not search.lacks_element(found):
-            break
-    if chosen is None:
+        return search, *_needed(search, search.run(), best.bic, seed)
+
+    # elements with an internal state only if functions may not suffice
+    always = policy.elements > 1
+    results = [searched(always)]
+    first, found, _ = results[0]
+    if not always and first.lacks_element(found):
+        results.append(searched(True))
+        second, found, _ = results[-1]
+        if first.need.preferred and second.falls_short(found):
+            # functions alone have not been sought
+            results.append(searched(False, dataclasses.replace(policy, elements=0)))
+    kept = [(one, its) for _, one, its in results if one is not None]
+    if not kept:
         return None, None, ()
-    return chosen, needed, rivals(chosen, tried, policy, seed)
+    chosen, its_needs = min(kept, key=lambda each: each[0].score)
+    tried = [one for search, _, _ in results for one in search.tried]
+    return chosen, its_needs, rivals(chosen, tried, policy, seed)
 
 
 def _needed(

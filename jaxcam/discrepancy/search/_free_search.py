@@ -145,13 +145,18 @@ class FreeSearch:
         This is the case if one is preferred to every function, or if the functions
         leave a residual that one may explain.
         """
-        if self.need.preferred:
+        if self.need.preferred or not self.falls_short(found):
+            return self.need.preferred
+        least = self._least()
+        if found is not None:
+            least = max(least, self._small(found) / heat_of(found.fit))
+        return self.need.remains(self.problem, found, least)
+
+    def falls_short(self, found: Missing | None) -> bool:
+        """Return whether nothing was found, or a residual above the noise is left."""
+        if found is None:
             return True
-        small = 0.0 if found is None else self._small(found)
-        if found is not None and leaves_noise(self.fits, found, small):
-            return False
-        heat = 1.0 if found is None else heat_of(found.fit)
-        return self.need.remains(self.problem, found, max(self._least(), small / heat))
+        return not leaves_noise(self.fits, found, self._small(found))
 
     def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
         """Return the labels of functions, and the fractions that their decoys gain."""
