@@ -110,17 +110,6 @@ class Leads:
             ):
                 yield Lead(grown, promise=one)
 
-    def of_elements(self, problem: Problem, found: Missing, driven: Driven) -> float:
-        """Return the largest predicted gain of an element, minus the penalty for its
-        parameters.
-        """
-        self.progress("searching for forces with an internal state", None)
-        heat = heat_of(found.fit)
-        problem = heated(filled(problem, found.functions), heat)
-        response = force_response(problem, found.fit.point, self.fits.free(found))
-        some = worthwhile(problem, response, driven, self.policy, heat)
-        return max((grown for grown, _ in some), default=0.0)
-
     def _has_room(self, found: Missing) -> bool:
         """Return whether a force with an internal state can be added."""
         slots = {one.slot for one in found.functions}
