@@ -17,7 +17,7 @@ input, is in units of the rms of the position. The last line of a case is the fr
 of the true system.
 
     python -m benchmarks.textbook_forces duffing
-    python -m benchmarks.textbook_forces bouc_wen --snr 100 --elements 1
+    python -m benchmarks.textbook_forces bouc_wen --snr 100 --elements 2
     python -m benchmarks.textbook_forces duffing_stop --tools pysindy
 """
 

@@ -164,7 +164,13 @@ def main() -> None:
     parser.add_argument("--effects", nargs="*", choices=sorted(EFFECTS))
     parser.add_argument("--first", type=int, default=0, help="seed of first case")
     parser.add_argument("--cases", type=int, default=1, help="cases per effect")
-    parser.add_argument("--elements", type=int, default=Policy().elements)
+    parser.add_argument(
+        "--elements",
+        type=int,
+        choices=(0, 1, 2),
+        default=Policy().elements,
+        help="`Policy.elements` of the diagnosis",
+    )
     args = parser.parse_args()
     policy = Policy(elements=args.elements)
     setup = read_setup(RIGS / f"{args.rig}.toml")

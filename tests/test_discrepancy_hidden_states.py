@@ -18,9 +18,9 @@ pytestmark = pytest.mark.slow
 _RIG = Path(__file__).parents[1] / "docs" / "rigs" / "two_stops.toml"
 
 
-def _diagnosed(hidden, seed):
+def _diagnosed(hidden, seed, policy=Policy()):
     runs = truth.records(hidden, seed, duration=4.0)
-    return diagnose(read_setup(_RIG), runs, case="cart", policy=Policy(elements=1))
+    return diagnose(read_setup(_RIG), runs, case="cart", policy=policy)
 
 
 def _gone(found):
@@ -73,5 +73,5 @@ def test_nothing_is_none(seed):
 
 
 def test_a_vibration_is_no_resonance():
-    found = _diagnosed(truth.shaken(0.3, 11.3), 36)
+    found = _diagnosed(truth.shaken(0.3, 11.3), 36, Policy(elements=2))
     assert all(one.kind != "resonance" for one in found.missing)

@@ -168,7 +168,6 @@ def test_forces_at_nodes_say_what_terms_in_the_system_say(build):
         )
 
 
-# the reason why elements are not looked for by default (`Policy.elements`)
 @pytest.mark.xfail(
     strict=True, reason="promises are 3 and 7 % too large, strengths a third off: open"
 )

@@ -213,26 +213,58 @@ def _without_a_name(
         return None, None, ()
     problem = question.problem
     positions, velocities, approach, duration = visited_states(problem).ranges(policy)
-    search = FreeSearch(
-        problem,
-        question.rig,
-        question.terms,
-        families(
-            positions,
-            velocities,
-            approach,
-            duration,
-            turned=question.turned,
-            impacting=any(len(part.impacts.approach) for part in problem.segments),
-            slip=question.references.slip_speed,
-            motion_unit=question.unit,
-        ),
-        policy,
-        trials.progress,
-        bare,
+    offered = families(
+        positions,
+        velocities,
+        approach,
+        duration,
+        turned=question.turned,
+        impacting=any(len(part.impacts.approach) for part in problem.segments),
+        slip=question.references.slip_speed,
+        motion_unit=question.unit,
     )
-    found = search.run()
-    while found is not None and found.functions and found.score < best.bic:
+
+    def searched(elements: bool, policy: Policy = policy):
+        search = FreeSearch(
+            problem,
+            question.rig,
+            question.terms,
+            offered,
+            policy,
+            trials.progress,
+            bare,
+            elements,
+        )
+        return search, *_needed(search, search.run(), best.bic, seed)
+
+    # elements with an internal state only if functions may not suffice
+    always = policy.elements > 1
+    results = [searched(always)]
+    first, found, _ = results[0]
+    if not always and first.lacks_element(found):
+        results.append(searched(True))
+        second, found, _ = results[-1]
+        if first.need.preferred and second.falls_short(found):
+            # functions alone have not been sought
+            results.append(searched(False, dataclasses.replace(policy, elements=0)))
+    kept = [(one, its) for _, one, its in results if one is not None]
+    if not kept:
+        return None, None, ()
+    chosen, its_needs = min(kept, key=lambda each: each[0].score)
+    tried = [one for search, _, _ in results for one in search.tried]
+    return chosen, its_needs, rivals(chosen, tried, policy, seed)
+
+
+def _needed(
+    search: FreeSearch, found: Missing | None, bic: float, seed: int
+) -> tuple[Missing | None, Needs | None]:
+    """Drop functions and terms that the bootstrap samples do not retain.
+
+    **Returns:** the fit with the others, and their bootstrap results; `None` if none is
+    left or their score is not below `bic`.
+    """
+    policy = search.policy
+    while found is not None and found.functions and found.score < bic:
         parts, prices = search.fits.parts(found), search.fits.prices(found)
         fitted = found.fit
         needed = needs(
@@ -240,12 +272,11 @@ def _without_a_name(
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
         if needed.inclusion[least] >= policy.sure:
-            others = rivals(found, search.tried, policy, seed)
-            return found._replace(decoys=search.decoys(found)), needed, others
+            return found._replace(decoys=search.decoys(found)), needed
         if len(parts) < 2:
             break
         found = search.without(found, least)
-    return None, None, ()
+    return None, None
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

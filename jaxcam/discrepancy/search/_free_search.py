@@ -16,6 +16,7 @@ from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
 from ._blocks import blocks_of, values_of
+from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._gains import added_gain, gain
@@ -37,8 +38,8 @@ class FreeSearch:
     """Adds functions and terms one by one, as long as the evidence increases.
 
     **Arguments:** the problem, names of the rig parameters, candidate terms, families
-    of functions, the policy, `progress(sentence, fraction)`, and the cost of the model
-    without any of them.
+    of functions, the policy, `progress(sentence, fraction)`, the cost of the model
+    without any of them, and whether elements with an internal state are candidates.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class FreeSearch:
         policy: Policy,
         progress: Callable[[str, float | None], None],
         cost: float,
+        elements: bool = False,
     ):
         self.cost = cost
         self.policy, self.progress = policy, progress
@@ -62,24 +64,31 @@ class FreeSearch:
         self.first: list[Lead] = []
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
-        self.driven = driven_by(problem, unit) if policy.elements else None
-        self.problem = roomy(problem, self.families[0], impacting, self.driven)
+        driven = driven_by(problem, unit) if elements or policy.elements else None
+        room, left = (driven, None) if elements else (None, driven)
+        self.need = ElementNeed(self.fits, left, policy)
+        self.problem = roomy(problem, self.families[0], impacting, room)
         # gain, offset and lag of a sensor are not unnamed functions
         faults = own_faults(self.problem.model, self.problem.parameters)
-        self.leads = Leads(
-            self.fits, self.families, self.driven, faults, policy, progress
-        )
+        self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
 
     def run(self) -> Missing | None:
-        """Return the functions and terms found, or `None` if none is significant."""
+        """Return the functions and terms found, or `None` if none is significant.
+
+        The search ends as soon as an element is preferred that is not a candidate.
+        """
         bare = self._bare(self.apart, self.problem.start)
         found = self._grown(bare, True)
+        if self.need.preferred:
+            return None
         most = self.policy.iterations
         found = self.fits.fitted(self._tight(found), found.fit.point, most)
         found = self._grown(found, False)
+        if self.need.preferred:
+            return None
         swapped = self._swapped(found)
         if swapped is not found:
             found = self._grown(swapped, False)
@@ -130,6 +139,25 @@ class FreeSearch:
         self.progress(f"fitting {lead.label} instead", None)
         return self._with(self.problem, bare, lead)
 
+    def lacks_element(self, found: Missing | None) -> bool:
+        """Return whether to repeat the search with elements among the candidates.
+
+        This is the case if one is preferred to every function, or if the functions
+        leave a residual that one may explain.
+        """
+        if self.need.preferred or not self.falls_short(found):
+            return self.need.preferred
+        least = self._least()
+        if found is not None:
+            least = max(least, self._small(found) / heat_of(found.fit))
+        return self.need.remains(self.problem, found, least)
+
+    def falls_short(self, found: Missing | None) -> bool:
+        """Return whether nothing was found, or a residual above the noise is left."""
+        if found is None:
+            return True
+        return not leaves_noise(self.fits, found, self._small(found))
+
     def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
         """Return the labels of functions, and the fractions that their decoys gain."""
         labels = {one.label for one in found.functions}
@@ -155,7 +183,12 @@ class FreeSearch:
                 # single pieces contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
-            self.first = self.first or leads
+            if not self.first:
+                self.first = leads
+                gains = [lead.gain for lead in leads]
+                self.need.compare(problem, found, gains, self._least())
+                if self.need.preferred:
+                    break
             best = found
             for lead in leads:
                 if self._done(best, lead, leads[0]):

@@ -1,0 +1,62 @@
+"""Decide whether functions suffice, or elements with an internal state are needed."""
+
+from collections.abc import Sequence
+
+from ...fitting import Problem
+from ..policy import Policy
+from ._free_fits import FreeFits, heat_of, heated, Missing
+from ._hidden_leads import worthwhile
+from ._hidden_signals import Driven
+from ._local_force import force_response
+from ._slots import filled
+
+
+class ElementNeed:
+    """Compares the predicted gains of elements with those of functions.
+
+    No element is fitted: a scan takes seconds, a search with elements minutes.
+
+    **Arguments:** the fits of subsets, the position that drives an element (`None` if
+    elements are not tried, or are candidates anyway), and the policy.
+    """
+
+    def __init__(self, fits: FreeFits, driven: Driven | None, policy: Policy):
+        self.fits, self.driven, self.policy = fits, driven, policy
+        # whether an element is predicted to gain more than any function
+        self.preferred = False
+        # the same for a gain that is comparable
+        self.comparable = False
+
+    def compare(
+        self, problem: Problem, bare: Missing, gains: Sequence[float], least: float
+    ) -> None:
+        """Compare an element with the first functions and terms.
+
+        **Arguments:** a fit without functions, their predicted gains in addition to it,
+        and the required gain.
+        """
+        promised, best = self._promised(problem, bare), max(gains, default=0.0)
+        self.preferred = promised > max(least, best)
+        self.comparable = promised > max(least, self.policy.promising * best)
+
+    def remains(self, problem: Problem, found: Missing | None, least: float) -> bool:
+        """Return whether an element may explain what functions leave.
+
+        **Arguments:** a fit with functions that leaves a residual, and the required
+        gain in addition to it.
+        """
+        if self.comparable or found is None:
+            return self.comparable
+        return self._promised(problem, found) > least
+
+    def _promised(self, problem: Problem, found: Missing) -> float:
+        """Return the largest predicted gain of an element, minus the penalty for its
+        parameters.
+        """
+        if self.driven is None:
+            return 0.0
+        heat = heat_of(found.fit)
+        problem = heated(filled(problem, found.functions), heat)
+        response = force_response(problem, found.fit.point, self.fits.free(found))
+        some = worthwhile(problem, response, self.driven, self.policy, heat)
+        return max((grown for grown, _ in some), default=0.0)

@@ -1,0 +1,62 @@
+"""Whether an element with an internal state is tried, from its predicted gain."""
+
+from typing import Any, cast
+
+import pytest
+
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search._element_need import ElementNeed
+from jaxcam.discrepancy.search._free_fits import FreeFits, Missing
+from jaxcam.fitting import Problem
+
+
+_LEAST = 24.0
+# what the predictions below do not use
+_PROBLEM = object.__new__(Problem)
+_FIT = Missing((), frozenset(), cast(Any, None), 0.0, _PROBLEM)
+
+
+class _Predicted(ElementNeed):
+    """Elements whose gain is given, before and after functions are added."""
+
+    def __init__(self, before, after=0.0):
+        super().__init__(FreeFits((), (), Policy()), None, Policy())
+        self.each = [before, after]
+
+    def _promised(self, problem, found):
+        return self.each.pop(0)
+
+
+@pytest.mark.parametrize(
+    ("promised", "functions", "preferred", "comparable"),
+    [
+        (110.0, [100.0, 90.0], True, True),
+        (60.0, [100.0, 90.0], False, True),
+        (40.0, [100.0], False, False),
+        # less than the false-alarm rate requires
+        (20.0, [], False, False),
+        (30.0, [], True, True),
+    ],
+)
+def test_an_element_is_compared_with_the_functions(
+    promised, functions, preferred, comparable
+):
+    need = _Predicted(promised)
+    need.compare(_PROBLEM, _FIT, functions, _LEAST)
+    assert (need.preferred, need.comparable) == (preferred, comparable)
+    # nothing was found: an element is tried if it was comparable
+    assert need.remains(_PROBLEM, None, _LEAST) == comparable
+
+
+@pytest.mark.parametrize(("after", "needed"), [(20.0, False), (30.0, True)])
+def test_an_element_may_explain_what_functions_leave(after, needed):
+    need = _Predicted(10.0, after)
+    need.compare(_PROBLEM, _FIT, [1000.0], _LEAST)
+    assert need.remains(_PROBLEM, _FIT, _LEAST) == needed
+
+
+def test_an_element_that_is_no_candidate_promises_nothing():
+    need = ElementNeed(FreeFits((), (), Policy()), None, Policy(elements=0))
+    need.compare(_PROBLEM, _FIT, [], _LEAST)
+    assert not need.preferred
+    assert not need.remains(_PROBLEM, None, _LEAST)
