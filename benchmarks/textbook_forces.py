@@ -141,7 +141,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the inputs")
     parser.add_argument("--tools", nargs="*", default=["jaxcam", "pysindy"])
     parser.add_argument(
-        "--elements", type=int, default=0, help="`Policy.elements` of the diagnosis"
+        "--elements",
+        type=int,
+        default=0,
+        choices=(0, 1, 2),
+        help="`Policy.elements` of the diagnosis",
     )
     parser.add_argument("--progress", action="store_true")
     args = parser.parse_args()

@@ -8,7 +8,7 @@ import pytest
 from textbook_systems import parameters
 
 import jaxcam
-from jaxcam.hybrid import flow
+from jaxcam.hybrid import flow, SwitchedSystem
 from jaxcam.hybrid.surface import impacts
 from jaxcam.models import InclinedShaker, SpinningBall
 
@@ -164,3 +164,55 @@ def test_chatter_with_friction_ends_in_sliding():
     start = float(made.contacts.start[0])
     np.testing.assert_allclose(start, 3 * fall, atol=1e-10)
     np.testing.assert_allclose(made.final[2], 4 - 0.05 * G, atol=1e-9)
+
+
+class Crate(SwitchedSystem):
+    """A crate on a rough floor that is pushed against a wall; unit mass."""
+
+    friction: float = 0.2
+    restitution: float = 0.5
+    push: float = 5.0
+    wall_friction: float = 0.0
+
+    def switching(self, t, state):
+        return state[2:]
+
+    def branch(self, t, state, sides):
+        zero = 0.0 * state[2]
+        return jnp.stack([*state[2:], self.push + zero, zero - 9.81])
+
+    def gap(self, t, state):
+        return jnp.stack([state[1], -state[0]])
+
+    def impact(self, t, state):
+        rebound = -self.restitution
+        return jnp.stack([state.at[3].multiply(rebound), state.at[2].multiply(rebound)])
+
+    def contact_friction(self, t, state, sides):
+        floor = jnp.zeros(4).at[2].set(-self.friction * sides[0])
+        wall = jnp.zeros(4).at[3].set(-self.wall_friction * sides[1])
+        return jnp.stack([floor, wall])
+
+
+@pytest.mark.parametrize("wall_friction", [0.0, 0.3])
+def test_chatter_against_a_wall_on_a_rough_floor(wall_friction):
+    """It never leaves the floor, and rests at the wall; time to 1e-6 s.
+
+    Every flight reverses, so the ratio of rebounds contains the friction.
+    """
+    crate = Crate(**parameters(wall_friction=wall_friction))
+    run = jaxcam.simulate(crate, [-1.0, 0.0, 0.0, 0.0], 0.0, 3.0)
+    assert run.successful, run.result
+    # speeds just before the impacts, and times between them
+    out, back = 5.0 + 0.2 * 9.81, 5.0 - 0.2 * 9.81
+    speed, rest = np.sqrt(2 * back), np.sqrt(2 / back)
+    for _ in range(100):
+        rebound = 0.5 * speed
+        speed = rebound * np.sqrt(back / out)
+        rest += rebound / out + speed / back
+    contacts = run.contacts
+    assert int(contacts.count) == 2
+    floor, wall = np.argsort(np.asarray(contacts.constraint)[:2])
+    assert contacts.start[floor] == 0.0 and contacts.end[floor] == 3.0
+    np.testing.assert_allclose(contacts.start[wall], rest, atol=1e-6)
+    np.testing.assert_allclose(run.final, 0.0, atol=1e-12)

@@ -277,6 +277,17 @@ def test_multipliers_with_sliding_agree_with_differences(forced):
     assert found[0] < 1e-9
 
 
+def test_a_stroboscope_of_the_main_loop(forced):
+    """The state after one forcing period, for two belt speeds at once, to 1e-7."""
+    system, state = forced
+    speeds = jnp.array([0.5, 0.6])
+    batch = jaxcam.stroboscope(system, state, 1, where=lambda s: s.belt, values=speeds)
+    for k, belt in enumerate(speeds):
+        one = eqx.tree_at(lambda s: s.belt, system, belt)
+        run = simulate_filippov(one, state, 0.0, float(system.period))
+        assert largest(batch.state[k, -1], run.final) < 1e-7
+
+
 def test_a_periodic_orbit_of_the_main_loop(forced):
     """The same orbit and multipliers as above, to 1e-6, as one that can be followed."""
     system, state = forced

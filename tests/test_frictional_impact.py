@@ -184,6 +184,29 @@ def test_the_law_with_the_slip_after_the_impact():
     assert np.sum(holds) > 200 and np.sum(reverses) > 50
 
 
+def test_the_law_with_the_final_slip_in_the_range_of_painleve():
+    """The body sticks where a slip forwards would pull it into the constraint."""
+    rates = Rates((-3.0, -0.2), (5.0, 2.0))
+    found = impulses(1.0, 1.0, -1.0, 0.5, rates, "complementarity")
+    assert found.positive > 0 and found.negative > 0
+    slip = 1.0 - 3.0 * found.positive + 5.0 * found.negative
+    rebound = -1.0 - 0.2 * found.positive + 2.0 * found.negative
+    np.testing.assert_allclose([slip, rebound], [0.0, 0.5], atol=1e-12)
+
+
+def test_derivatives_without_friction_are_finite():
+    """Of the law with the final slip, forward and reverse."""
+
+    def total(v):
+        side, slip = jnp.asarray(1.0), jnp.asarray(jnp.inf)
+        both = (jnp.asarray(0.0), jnp.asarray(1.0))
+        rates = Rates(both, both)
+        return impulses(side, slip, v, 0.5, rates, "complementarity").total
+
+    assert float(jax.grad(total)(-1.0)) == -1.5
+    assert float(jax.jacfwd(total)(-1.0)) == -1.5
+
+
 @pytest.mark.parametrize("kind", ALL_KINDS)
 def test_a_falling_rod(kind):
     """Velocities of the lower end after the impact, to 1e-12."""

@@ -17,7 +17,7 @@ CLOSED = jnp.ones(2, dtype=bool)
 
 
 class Contacts(SwitchedSystem):
-    """A body that touches two constraints; positions, then velocities.
+    """A body that touches several constraints; positions, then velocities.
 
     The mass matrix is `inverse` inverted; the gaps grow along the rows of `normals`,
     the contacts slip along the rows of `tangents`.
@@ -67,19 +67,19 @@ def body(parameters: Any, kind: str) -> Contacts:
     return Contacts(inverse, normals, tangents, friction, restitution, kind)
 
 
-def drawn(seed: int, number: int):
-    """Parameters and velocities of random bodies, a batch of each."""
+def drawn(seed: int, number: int, m: int = 2):
+    """Parameters and velocities of random bodies with `m` contacts, a batch of each."""
     rng = np.random.default_rng(seed)
     roots = rng.normal(size=(number, 3, 3)) + 1.5 * np.eye(3)
-    angles = rng.uniform(-1.2, 1.2, (number, 2))
-    normals = np.stack([np.sin(angles), np.cos(angles), rng.normal(size=(number, 2))])
-    tangents = np.stack([np.cos(angles), -np.sin(angles), rng.normal(size=(number, 2))])
+    angles = rng.uniform(-1.2, 1.2, (number, m))
+    normals = np.stack([np.sin(angles), np.cos(angles), rng.normal(size=(number, m))])
+    tangents = np.stack([np.cos(angles), -np.sin(angles), rng.normal(size=(number, m))])
     return (
         np.einsum("kij,klj->kil", roots, roots),
         normals.transpose(1, 2, 0),
         tangents.transpose(1, 2, 0),
-        rng.uniform(0.05, 0.6, (number, 2)),
-        rng.uniform(0, 1, (number, 2)),
+        rng.uniform(0.05, 0.6, (number, m)),
+        rng.uniform(0, 1, (number, m)),
     ), rng.normal(size=(number, 3)) * [0.7, 1.0, 1.0] - [0, 0.8, 0]
 
 
@@ -206,6 +206,67 @@ def test_the_order_of_the_constraints_does_not_matter(joint, kind):
         np.asarray(joint[kind](p, velocity, CLOSED)) for p in (parameters, exchanged)
     )
     np.testing.assert_allclose(first, second, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["kinetic", "complementarity"])
+def test_three_contacts(kind):
+    """Energy and normal velocities of 300 bodies, to 1e-8; the third is without
+    friction in half of them.
+    """
+    parameters, velocity = drawn(7, 300, 3)
+    parameters[3][::2, 2] = 0.0
+
+    @jax.jit
+    @jax.vmap
+    def joint(one, v):
+        state = jnp.concatenate([jnp.zeros(3), v])
+        closed = jnp.ones(3, dtype=bool)
+        return impacts_together(body(one, kind), jnp.asarray(0.0), state, closed)[3:]
+
+    found = np.asarray(joint(parameters, velocity))
+    mass = np.linalg.inv(parameters[0])
+    before, after = (np.einsum("ki,kij,kj->k", v, mass, v) for v in (velocity, found))
+    assert np.max((after - before) / before) < 1e-8
+    assert np.min(np.einsum("kij,kj->ki", parameters[1], found)) > -1e-8
+    assert np.mean(after > 0.1 * before) > 0.1
+
+
+@pytest.mark.parametrize("kind", ["kinetic", "complementarity"])
+def test_a_contact_at_rest(joint, kind):
+    """A rounding error of its normal velocity has no effect, to 1e-8."""
+    parameters, velocity = drawn(8, 200)
+    normal, other = parameters[1][:, 1], parameters[1][:, 0]
+    size = np.sum(normal * normal, axis=1)
+    results = []
+    for rest in (-1e-16, 0.0, 1e-12):
+        along = (rest - np.sum(normal * velocity, axis=1)) / size
+        at_rest = velocity + along[:, None] * normal
+        results.append(np.asarray(joint[kind](parameters, at_rest, CLOSED)))
+    assert np.sum(np.sum(other * at_rest, axis=1) < 0) > 50
+    assert np.all(np.isfinite(results))
+    # a body may be at the point of slipping
+    same = np.max(np.abs(np.subtract(results[:2], results[2])), axis=(0, 2)) < 1e-8
+    assert np.sum(same) >= 198
+
+
+@pytest.mark.parametrize("friction", [0.0, 1e-10, 1e-7])
+def test_weak_friction(joint, friction):
+    """No gap closes further, to 1e-9, and the motion tends to that without."""
+    parameters, velocity = drawn(9, 200)
+    results = []
+    for value in (friction, 0.0):
+        one = (*parameters[:3], np.full((200, 2), value), 0 * parameters[4])
+        results.append(np.asarray(joint["kinetic"](one, velocity, CLOSED)))
+    assert np.min(np.einsum("kij,kj->ki", parameters[1], results[0])) > -1e-9
+    assert np.max(np.abs(results[0] - results[1])) < 1e3 * friction + 1e-9
+
+
+def test_no_closed_contact(joint):
+    """Nothing changes, and the derivatives are finite."""
+    parameters, velocity = drawn(10, 20)
+    none = jnp.zeros(2, dtype=bool)
+    found = joint["kinetic"](parameters, velocity, none)
+    np.testing.assert_array_equal(found, velocity)
 
 
 def test_one_closed_contact_alone(joint):

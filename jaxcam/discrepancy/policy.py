@@ -206,7 +206,7 @@ class Policy:
         2, "maximum number of free functions for unknown physics; 0: none"
     )
     elements: int = _bounds(
-        1, "use of an internal state; 0: never, 1: if functions fall short, 2: always"
+        1, "use of an internal state; 0: never, 1: if functions may not do, 2: always"
     )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
@@ -324,10 +324,9 @@ class Policy:
                     f"Policy: `{name}` is {value!r}; give a number between 0 and 1."
                 )
         for setting in self.settings():
-            if setting.name in ("functions", "elements"):
-                continue
+            least = -1 if setting.name in ("functions", "elements") else 0
             low = min(setting.value) if _several(setting.value) else setting.value
-            if not low > 0 or not math.isfinite(low):
+            if not low > least or not math.isfinite(low):
                 raise ValueError(
                     f"Policy: `{setting.name}` is {setting.value!r}; give positive "
                     f"numbers."

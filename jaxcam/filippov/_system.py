@@ -16,7 +16,7 @@ class FilippovSystem(SwitchedSystem):
     never jumps.
 
     It is a [`jaxcam.hybrid.SwitchedSystem`][] with one surface: `jaxcam.simulate`,
-    stroboscopes, basins, periodic orbits and branches accept it.
+    stroboscopes and `continuation.periodic_orbit` accept it.
 
     Examples:
         >>> from jaxcam.filippov import FilippovSystem
@@ -44,5 +44,14 @@ class FilippovSystem(SwitchedSystem):
         """Return the scalar H that is zero on the surface."""
 
     def branch(self, t, state: Float[Array, " n"], sides) -> Float[Array, " n"]:
-        """Return `above` or `below`, shape `(n,)`."""
+        """Return the rate of change on one side of the surface.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+            sides: +1 above the surface or -1 below it, shape `(1,)`.
+
+        Returns:
+            Rates per second, shape `(n,)`.
+        """
         return jnp.where(sides[0] > 0, self.above(t, state), self.below(t, state))

@@ -139,9 +139,9 @@ class SwitchedSystem(HybridSystem):
         velocities, and all of the friction acts against the slip after the impact, as
         in time-stepping schemes; it differs if the slip reverses.
 
-        An impact during contact with other constraints is an impact on all of them:
-        with Newton's coefficient for `"kinematic"` and `"complementarity"`, otherwise
-        with Poisson's.
+        An impact while other gaps are closed is an impact on all of them (up to three
+        constraints, more than three states): with Newton's coefficient for
+        `"kinematic"` and `"complementarity"`, otherwise with Poisson's.
         """
         return "kinematic"
 
@@ -159,7 +159,8 @@ class SwitchedSystem(HybridSystem):
         mu times the normal force. `impact` is then the law without friction, from which
         the coefficient of restitution follows; `restitution_kind` determines its
         meaning. During an impact, the body slips until friction has stopped it; then it
-        sticks, or slips back if friction is too weak.
+        sticks, or slips back if friction is too weak. The friction of a constraint must
+        act against one switching function, its slip velocity.
 
         Args:
             t: Time (s).

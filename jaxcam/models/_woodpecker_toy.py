@@ -22,13 +22,14 @@ class WoodpeckerToy(SwitchedSystem):
     At the end of its swing, the beak hits the bar.
 
     The state is (height of the sleeve, its angle, angle of the bird, and their
-    velocities). The first constraint is the beak, the others are the lower and the
-    upper edge of the sleeve. The beak has the coefficient of restitution `restitution`,
-    the edges do not bounce; all have the coefficient of friction
-    `friction_coefficient`. The height does not influence the motion.
+    velocities); a positive angle of the bird moves the beak towards the bar. The first
+    constraint is the beak, the others are the lower and the upper edge of the sleeve.
+    The beak has the coefficient of restitution `restitution`, the edges do not bounce;
+    all have the coefficient of friction `friction_coefficient`. The height does not
+    influence the motion.
 
     The default values are those of Glocker's toy. The first simulation in a process
-    compiles for one to two minutes, unless its program is in JAX's cache on disk.
+    compiles for about a minute, unless its program is in JAX's cache on disk.
 
     C. Glocker, Dynamik von Starrkörpersystemen mit Reibung und Stössen, thesis, TU
     München (1995), pp. 162 ff.; R. I. Leine, D. H. van Campen, C. Glocker, Nonlinear
@@ -168,7 +169,9 @@ class WoodpeckerToy(SwitchedSystem):
             bird_mass=self.bird_mass,
             bird_inertia=self.bird_inertia,
             bar_radius=self.bar_radius,
+            clearance=self.sleeve_radius - self.bar_radius,
             sleeve_height=self.sleeve_height,
+            beak_height=self.beak_height,
             stiffness=self.stiffness,
             gravity=self.gravity,
         )

@@ -22,9 +22,9 @@ class ElementNeed:
 
     def __init__(self, fits: FreeFits, driven: Driven | None, policy: Policy):
         self.fits, self.driven, self.policy = fits, driven, policy
-        # whether an element is predicted to gain more than any function
+        # whether an element is predicted to gain more than any function or term
         self.preferred = False
-        # the same for a gain that is comparable
+        # whether it is predicted to gain at least `promising` times as much
         self.comparable = False
 
     def compare(

@@ -61,7 +61,7 @@ class FreeSearch:
         # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
         # candidates for the first function
-        self.first: list[Lead] = []
+        self.first: list[Lead] | None = None
         impacting = any(family.where is not Where.FLIGHT for family in families)
         unit = self.families[0].motion_unit
         driven = driven_by(problem, unit) if elements or policy.elements else None
@@ -127,7 +127,7 @@ class FreeSearch:
         fitted = {one.label for trial in self.tried for one in trial.functions}
         return [
             lead
-            for lead in self.first
+            for lead in self.first or []
             if lead.family is not None and lead.label not in fitted
         ]
 
@@ -163,7 +163,7 @@ class FreeSearch:
         labels = {one.label for one in found.functions}
         return tuple(
             (lead.label, lead.decoy)
-            for lead in self.first
+            for lead in self.first or []
             if lead.label in labels and lead.decoy is not None
         )
 
@@ -183,7 +183,7 @@ class FreeSearch:
                 # single pieces contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
-            if not self.first:
+            if self.first is None:
                 self.first = leads
                 gains = [lead.gain for lead in leads]
                 self.need.compare(problem, found, gains, self._least())

@@ -14,6 +14,8 @@ class Hits(NamedTuple):
 
     # whether there are several
     several: Any
+    # whether the law is that of an impact on several
+    joins: Any
     after: tuple
     # which constraints are hit
     hit: list
@@ -25,8 +27,8 @@ def hits_together(
     """Return the impact on all constraints that are reached at the same instant.
 
     Their gaps cannot be distinguished from zero, and they approach. Other closed gaps
-    take part, so that none of them is closed further. With friction, those in contact
-    take part in every impact, because they may jam.
+    take part, so that none of them is closed further. With friction, closed gaps take
+    part in every impact, because a body may jam.
 
     **Arguments:** which constraint is `hit` first; the `jets` at the end of the step;
     the time of the impact after it, and as a time (s); the state before the impact; and
@@ -34,7 +36,7 @@ def hits_together(
     """
     m, several = functions.m, jnp.asarray(False)
     if not functions.joins:
-        return Hits(several, after, hit)
+        return Hits(several, several, after, hit)
     strikes = any_of(hit[:m])
     slow = functions.speed_blur(t, x, carried.mode)
     closed, all_hit = [], list(hit)
@@ -49,7 +51,7 @@ def hits_together(
         all_hit[k] = hit[k] | also
     joins = several
     if functions.rubs:
-        joins = strikes & (several | any_of(carried.contact))
+        joins = strikes & any_of([closed[k] & ~hit[k] for k in range(m)])
         closed = [joins & one for one in closed]
     joint = functions.impacts_together(t, x, closed, carried.mode)
-    return Hits(several, select(joins, joint, after), all_hit)
+    return Hits(several, joins, select(joins, joint, after), all_hit)

@@ -12,9 +12,14 @@ from ._hits_together import hits_together
 from ._loop_state import LoopState
 from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
 from ._rest_together import loses_energy, rest_together
-from ._select import any_of, of_constraint, select
+from ._select import any_of, largest, of_constraint, select
 from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
+
+
+# changes of the normal velocities by a joint impact below this fraction of the largest
+# are rounding
+_JOINT = 1e-13
 
 
 class Landing(NamedTuple):
@@ -76,7 +81,7 @@ def land(
     number = functions.m + functions.k
     hit = [lands & (flown.constraint == k) for k in range(number)]
     strikes = any_of(hit[: functions.m]) if functions.k else lands
-    several, after, hit = hits_together(
+    several, joins, after, hit = hits_together(
         functions, carried, hit, made.jets, offset, seen, landed, after
     )
     speeds = [
@@ -84,7 +89,7 @@ def land(
     ]
     approach = of_constraint(speeds, flown.constraint)
     x = select(lands, after, made.x)
-    mode = _kept_contacts(functions, carried, lands, seen, landed, x)
+    mode = _kept_contacts(functions, carried, lands, joins, seen, landed, x)
     slides, leaves, stuck = no, no, no
     if functions.k:
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
@@ -104,7 +109,9 @@ def land(
     )
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
-    impact = Impact(t, landed, after, approach, rebound, flown.constraint, several)
+    impact = Impact(
+        t, landed, after, approach, rebound, flown.constraint, several, joins
+    )
     parts = carried, end, impact, speeds, jets, mode, hit, fastest, rounding
     ending = _ending(functions, plan, *parts)
     hidden = _hides(carried, impact, jets, rounding)
@@ -173,19 +180,24 @@ def _ending(
     return _Ending(chatter, begins | both, closing, pulls)
 
 
-def _kept_contacts(functions, carried, lands, t, before, after):
+def _kept_contacts(functions, carried, lands, joins, t, before, after):
     """Return the contacts kept after an impact, which may break contact elsewhere.
 
-    A contact breaks if the impact changes its normal velocity by more than rounding.
+    A contact breaks if the impact changes its normal velocity by more than rounding; if
+    it took part in the impact, relative to the largest change.
     """
     mode = carried.mode
     if functions.m <= 1:
         return carried.contact
     speeds = functions.velocity(t, before, mode), functions.velocity(t, after, mode)
     rounding = [functions.speed_blur(t, x, mode) for x in (before, after)]
+    changes = [jnp.abs(new - old) for old, new in zip(*speeds, strict=True)]
+    least = jnp.zeros(())
+    if functions.rubs:
+        least = jnp.where(joins, _JOINT * largest(changes), 0.0)
     return tuple(
-        c & (~lands | (jnp.abs(new - old) <= 500 * (a + b)))
-        for c, old, new, a, b in zip(carried.contact, *speeds, *rounding, strict=True)
+        c & (~lands | (change <= jnp.maximum(500 * (a + b), least)))
+        for c, change, a, b in zip(carried.contact, changes, *rounding, strict=True)
     )
 
 

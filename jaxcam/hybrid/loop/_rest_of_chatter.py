@@ -31,6 +31,8 @@ class Impact(NamedTuple):
     constraint: Any
     # whether it is an impact on several constraints at once
     several: Any
+    # whether the law is that of an impact on several constraints
+    joins: Any
 
 
 def rest_of_chatter(
@@ -42,13 +44,21 @@ def rest_of_chatter(
     `mode` then, the time (s) of the next `stop` of the run, and the `rounding` of each
     gap and switching function.
     """
-    t, before, after, approach, rebound, constraint, several = impact
+    t, before, after, approach, rebound, constraint, several, joins = impact
     dampings, restitutions, states = functions.chatter(t, before, after, mode)
     damping = of_constraint(dampings, constraint)
     r0 = of_constraint(restitutions, constraint)
     state = states[0]
     for k in range(1, functions.m):
         state = select(constraint == k, states[k], state)
+    if functions.rubs and functions.joins:
+        # the ratio and the direction of an impact on all closed gaps
+        change = jnp.where(joins & (rebound > approach), rebound - approach, 1.0)
+        ratio = rebound / jnp.where(joins & (approach < 0), -approach, 1.0)
+        r0 = jnp.where(joins, ratio, r0)
+        part = jnp.where(joins, rebound / change, 0.0)
+        alone = [b + part * (a - b) for a, b in zip(before, after, strict=True)]
+        state = select(joins, tuple(alone), state)
     a = of_constraint([j.acceleration for j in jets], constraint)
     j = of_constraint([j.jerk for j in jets], constraint)
     small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a

@@ -21,7 +21,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 
 _SLIPS_BACK, _STICKS = 2, 3
-# violations of a condition below this, relative to the largest velocity, are rounding
+# violations of a condition below this, relative to the velocities, are rounding
 _ROUNDING = 1e-10
 
 
@@ -29,10 +29,13 @@ def contact_impulses(
     matrix: Float[Array, "k k"],
     velocities: Float[Array, " k"],
     closed: Bool[Array, " m"],
+    sizes: Float[Array, " k"],
     given: Float[Array, " m"] | None = None,
 ) -> Float[Array, " k"]:
-    """Return the normal impulses during negative slip, then the whole normal impulses,
-    at the `closed` contacts. If the latter are `given`, only the former are determined.
+    """Return two impulses of each `closed` contact: the parts of the normal impulses
+    during negative slip, then the normal impulses.
+
+    If the latter are `given`, only the former are determined.
 
     If several combinations of states fulfil all conditions, as for a body that jams
     between its contacts, the solution is the one with the smallest sum of impulses. The
@@ -45,21 +48,22 @@ def contact_impulses(
       contact, then by a unit of impulse during positive slip at each (columns). A row
       of a contact without friction is zero.
     - `velocities`: the slip velocities, then the normal velocities.
+    - `sizes`: the sizes of these velocities, positive, for their rounding errors.
     """
     number = len(closed)
     states = 4 if given is None else 3
     combinations = jnp.where(jnp.any(closed), states**number, 0)
     known = jax.lax.stop_gradient((matrix, velocities, given))
-    speed = jnp.max(jnp.abs(known[1]))
+    size = sizes[-1]
 
     def better(carry):
         index, best, found = carry
         codes = _states(index, number, given)
         impulses, after = _solved(*known, codes)
-        least = _least(impulses, after, codes, closed, given)
+        least = _least(impulses / size, after / sizes, codes, closed, given)
         # positive if valid
-        small = speed / (speed + jnp.sum(impulses[number:]))
-        rank = jnp.where(least >= -_ROUNDING * speed, small, least)
+        small = size / (size + jnp.sum(impulses[number:]))
+        rank = jnp.where(least >= -_ROUNDING, small, least)
         improves = rank > best
         return (
             index + 1,

@@ -74,15 +74,20 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
 
 def _by_final_slip(slip, change, rates: Rates) -> Impulses:
     """Return the impulses that change the normal velocity by `change`, with friction
-    opposite to the slip after them."""
+    opposite to the slip after them.
+    """
     (s1, v1), (s2, v2) = rates
-    ahead, behind = change / v1, change / v2
-    forward = slip + s1 * ahead >= 0
-    backward = slip + s2 * behind <= 0
+    # in the range of Painleve, a normal impulse may not push the body away
+    ahead = change / jnp.where(v1 > 0, v1, 1.0)
+    behind = change / jnp.where(v2 > 0, v2, 1.0)
+    forward = (v1 > 0) & (slip + s1 * ahead >= 0)
+    backward = (v2 > 0) & (slip + s2 * behind <= 0)
     # both velocities are given if it sticks
-    both = jnp.where(forward | backward, 1.0, s2 * v1 - s1 * v2)
-    positive = (change * s2 + slip * v2) / both
-    negative = -(change * s1 + slip * v1) / both
+    sticks = ~(forward | backward)
+    both = jnp.where(sticks, s2 * v1 - s1 * v2, 1.0)
+    held = jnp.where(sticks, slip, 0.0)
+    positive = (change * s2 + held * v2) / both
+    negative = -(change * s1 + held * v1) / both
     positive = jnp.where(forward, ahead, jnp.where(backward, 0.0, positive))
     negative = jnp.where(forward, 0.0, jnp.where(backward, behind, negative))
     return Impulses(positive + negative, positive, negative)

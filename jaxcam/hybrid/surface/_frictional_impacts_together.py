@@ -8,8 +8,10 @@ opposes the slip after it. (J. J. Moreau, Unilateral contact and dry friction in
 freedom dynamics, 1988; C. Glocker, F. Pfeiffer, Multiple impacts with friction in rigid
 multibody systems, Nonlinear Dynamics 7, 1995)
 
-Compression alone never creates energy. What restitution adds to it is reduced, if
-necessary, until an impact does not create energy either.
+Compression alone never creates energy. What restitution adds to it is reduced at all
+contacts, if necessary, until an impact does not create energy either; friction is then
+within its limits, but need not reach them at a contact that slips. The energy is known
+without the masses if the friction of a contact acts against its switching function.
 """
 
 from typing import NamedTuple
@@ -52,8 +54,8 @@ def frictional_impacts_together(
         closed,
     )
     newton = restitution_kind(system) in ("kinematic", "complementarity")
-    # in a loop of one turn, the arrays are not split into scalars, of which there would
-    # be thousands
+    # a scan of length one keeps the arrays, which would else be split into thousands of
+    # scalars
     _, found = jax.lax.scan(
         lambda _, __: (None, _impulses(*sent, newton)), None, None, length=1
     )
@@ -72,22 +74,35 @@ def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bo
     - `newton`: whether the `coefficients` are Newton's, otherwise Poisson's.
     """
     number = len(closed)
-    pressed = contact_impulses(matrix, velocities, closed)
+    slips, before = velocities[:number], velocities[number:]
+    sizes = jnp.repeat(
+        jnp.stack([_largest(slips, closed), _largest(before, closed)]), number
+    )
+    pressed = contact_impulses(matrix, velocities, closed, sizes)
     between = velocities + matrix @ pressed
-    before = velocities[number:]
     if newton:
-        bounce = coefficients * jnp.minimum(before, 0.0)
-        wanted = velocities.at[number:].add(bounce)
-        back = contact_impulses(matrix, wanted, closed) - pressed
+        rebound = coefficients * jnp.minimum(before, 0.0)
+        wanted = velocities.at[number:].add(rebound)
+        back = contact_impulses(matrix, wanted, closed, sizes) - pressed
     else:
         normal = coefficients * pressed[number:]
-        back = contact_impulses(matrix, between, closed, normal)
+        back = contact_impulses(matrix, between, closed, sizes, normal)
     # the energy is that of friction and normal impulses
     along = jnp.concatenate([along, jnp.zeros_like(before)])
     down, up = (part + along * jnp.tile(part[number:], 2) for part in (pressed, back))
     bounds = restitution_bound(apart, velocities, down, up, jnp.ones(2 * number))
     back = jnp.min(bounds) * back
-    return pressed + back + contact_impulses(matrix, between + matrix @ back, closed)
+    after = between + matrix @ back
+    return pressed + back + contact_impulses(matrix, after, closed, sizes)
+
+
+def _largest(velocities, closed):
+    """Return the largest size of the velocities at closed contacts, or one if they are
+    all zero; without derivatives.
+    """
+    sizes = jax.lax.stop_gradient(jnp.abs(velocities))
+    found = jnp.max(jnp.where(closed, sizes, 0.0))
+    return jnp.where(found > 0, found, 1.0)
 
 
 class _Rubbing(NamedTuple):

@@ -19,6 +19,11 @@ from ._frictional_impact import impulses, Rates
 from ._normal import normal_directions, normal_velocity
 
 
+# approach velocities below this fraction of the terms of a normal velocity count as
+# rounding errors of a constraint at rest
+_SLOW = 1e-8
+
+
 def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"]:
     """Return the state after an impact at each constraint, one row for each; friction
     included.
@@ -55,11 +60,13 @@ def frictionless_law(
 
     Returns:
         Unit directions, shape `(m, n)`, and coefficients, shape `(m,)`; friction is not
-            included. Those of a constraint that does not approach are the limits of
-            slow impacts.
+            included. Those of a constraint that does not approach, or only by a
+            rounding error, are the limits of slow impacts.
     """
     after = jnp.atleast_2d(system.impact(t, x))
-    return _law(system, t, x, normal_velocity(system, t, x), after)
+    before = normal_velocity(system, t, x)
+    slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
+    return _law(system, t, x, before, after, _SLOW * jnp.abs(slope) @ jnp.abs(x))
 
 
 def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
@@ -104,7 +111,7 @@ def _with_friction(
     """
     sides, kind = sides_of(system, t, x), restitution_kind(system)
     before = normal_velocity(system, t, x)
-    directions, coefficients = _law(system, t, x, before, after)
+    directions, coefficients = _law(system, t, x, before, after, 0 * before)
     rows = []
     for k, direction in enumerate(directions):
         one = contact_at(system, t, x, k, sides, direction)
@@ -116,16 +123,16 @@ def _with_friction(
     return jnp.stack(rows)
 
 
-def _law(system, t, x, before, after):
+def _law(system, t, x, before, after, slow):
     """Return the directions and coefficients that frictionless impacts give.
 
-    At rest, they are limits.
+    Up to the approach velocities `slow`, they are limits.
     """
     limits = normal_directions(system, t, x)
     directions, coefficients = [], []
     for k, row in enumerate(after):
         approach, rebound = before[k], normal_velocity(system, t, row)[k]
-        moves = approach < 0
+        moves = approach < -slow[k]
         impulse = jnp.where(moves, rebound - approach, 1.0)
         direction = jnp.where(moves, (row - x) / impulse, limits[k])
         coefficient = jnp.where(
