@@ -37,6 +37,13 @@ def _within(x, low, high):
     return 1.0 * ((x > low) & (x < high))
 
 
+def _direction(w):
+    """The sign of a velocity, smooth within a thousandth of the largest, so that an
+    integrator does not stall where the rig sticks.
+    """
+    return np.tanh(w / 1e-3)
+
+
 def _spring_and_damper(own, u, rate, hertz):
     """A damper in series with a spring, whose force relaxes."""
     return (rate - own[0] * 1.5 * hertz,)
@@ -92,7 +99,7 @@ EFFECTS = {
     ),
     "stick_slip": _force(
         _AT_SPEED,
-        lambda u, w, phi, t, s: -np.sign(w) * np.exp(-((w / 0.15) ** 2)),
+        lambda u, w, phi, t, s: -_direction(w) * np.exp(-((w / 0.15) ** 2)),
         0.02,
         0.06,
     ),

@@ -18,6 +18,7 @@ from jaxcam.filippov import (
     simulate_filippov,
 )
 from jaxcam.filippov.modes import region, sliding_field
+from jaxcam.hybrid import stroboscope
 from jaxcam.models import (
     BeltOscillator,
     PiecewiseLinear,
@@ -281,11 +282,11 @@ def test_a_stroboscope_of_the_main_loop(forced):
     """The state after one forcing period, for two belt speeds at once, to 1e-7."""
     system, state = forced
     speeds = jnp.array([0.5, 0.6])
-    batch = jaxcam.stroboscope(system, state, 1, where=lambda s: s.belt, values=speeds)
+    batch = stroboscope(system, state, 1, where=lambda s: s.belt, values=speeds)
     for k, belt in enumerate(speeds):
         one = eqx.tree_at(lambda s: s.belt, system, belt)
         run = simulate_filippov(one, state, 0.0, float(system.period))
-        assert largest(batch.state[k, -1], run.final) < 1e-7
+        assert largest(batch.states[k, -1], run.final) < 1e-7
 
 
 def test_a_periodic_orbit_of_the_main_loop(forced):
