@@ -45,7 +45,7 @@ def test_a_hidden_resonance_is_modelled():
     assert _gone(found) > 0.9
     system = found.system(0)
     assert isinstance(system, WithHidden)
-    motion = simulate(system, [0.01, 0.3, 0.0, 0.0], 0.0, 1.0)
+    motion = simulate(system, [0.01, 0.3, 0.0, 0.0], 0.0, 4.0)
     assert motion.impacts.count > 1
 
 
