@@ -10,6 +10,7 @@ import pytest
 
 from jaxcam.hybrid import SwitchedSystem
 from jaxcam.hybrid.surface import impacts, impacts_together
+from jaxcam.models import WoodpeckerToy
 
 
 KINDS = "kinematic", "kinetic", "energetic", "complementarity"
@@ -262,11 +263,15 @@ def test_weak_friction(joint, friction):
 
 
 def test_no_closed_contact(joint):
-    """Nothing changes, and the derivatives are finite."""
+    """Nothing changes: the derivative in reverse mode is the identity."""
     parameters, velocity = drawn(10, 20)
     none = jnp.zeros(2, dtype=bool)
     found = joint["kinetic"](parameters, velocity, none)
     np.testing.assert_array_equal(found, velocity)
+    slopes = jax.vmap(jax.jacrev(joint["kinetic"].__wrapped__, 1), (0, 0, None))
+    one = (jax.tree.map(lambda p: p[:, None], parameters), velocity[:, None], none)
+    whole = np.asarray(jax.jit(slopes)(*one))[:, 0, :, 0]
+    np.testing.assert_array_equal(whole, np.broadcast_to(np.eye(3), whole.shape))
 
 
 def test_one_closed_contact_alone(joint):
@@ -318,3 +323,26 @@ def test_the_derivatives_of_a_joint_impact():
     off = np.max(np.abs(forward - expected), axis=(1, 2)) / size
     # a contact may be at the point of slipping
     assert np.sum(off < 1e-6) >= 38
+
+
+def test_the_compliance_of_the_woodpecker_toy():
+    """It is the inverse of the mass matrix, to 1e-9; at a joint impact, the beak
+    rebounds and the edge stays outside the bar.
+    """
+    toy = WoodpeckerToy()
+    bird, sleeve = 4.5e-3, 3e-4
+    mass = [
+        [bird + sleeve, bird * 0.01, bird * 0.015],
+        [bird * 0.01, 5e-9 + bird * 0.01**2, bird * 0.01 * 0.015],
+        [bird * 0.015, bird * 0.01 * 0.015, 7e-7 + bird * 0.015**2],
+    ]
+    np.testing.assert_allclose(toy._inverse @ np.array(mass), np.eye(3), atol=1e-9)
+    # the beak hits while the upper edge jams
+    state = jnp.array([0.0, 0.6 / 5.8, 0.12, -0.1, 0.0, 17.0])
+    closed = jnp.array([True, False, True])
+    after = np.asarray(impacts_together(toy, jnp.asarray(0.0), state, closed))
+    gaps = np.asarray(toy._normals) @ after[3:]
+    np.testing.assert_allclose(gaps[0], 0.5 * 0.02 * 17.0, atol=1e-9)
+    assert gaps[2] > -1e-12
+    twice = [v @ np.array(mass) @ v for v in (np.asarray(state[3:]), after[3:])]
+    assert twice[1] < twice[0]

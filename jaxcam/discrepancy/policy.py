@@ -206,7 +206,7 @@ class Policy:
         2, "maximum number of free functions for unknown physics; 0: none"
     )
     elements: int = _bounds(
-        1, "use of an internal state; 0: never, 1: if functions may not do, 2: always"
+        1, "internal states; 0: never, 1: if functions may not suffice, 2: always"
     )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),

@@ -23,19 +23,8 @@ from jaxtyping import Array, Bool, Float
 from .._types import State
 from ._contact_friction import restitution_kind, sides_of, surfaces_of
 from ._coulomb_contacts import contact_impulses
-from ._impacts import contact_at
+from ._impacts import contact_at, FrictionlessLaw
 from ._restitution_bound import restitution_bound
-
-
-class FrictionlessLaw(NamedTuple):
-    """The normal velocities, their derivatives by the state, and the directions and
-    coefficients of restitution of impacts without friction.
-    """
-
-    velocities: Float[Array, " m"]
-    slope: Float[Array, "m n"]
-    directions: Float[Array, "m n"]
-    coefficients: Float[Array, " m"]
 
 
 def frictional_impacts_together(

@@ -48,10 +48,21 @@ def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"
     return _with_friction(system, t, x, after)
 
 
-def frictionless_law(
-    system: HybridSystem, t: RealScalar, x: State
-) -> tuple[Float[Array, "m n"], Float[Array, " m"]]:
-    """Return the impulse directions and the coefficients of restitution at a state.
+class FrictionlessLaw(NamedTuple):
+    """The law of impacts without friction at a state, for each constraint."""
+
+    velocities: Float[Array, " m"]
+    """Normal velocities."""
+    slope: Float[Array, "m n"]
+    """Their derivatives with respect to the state."""
+    directions: Float[Array, "m n"]
+    """Unit directions of the impulses."""
+    coefficients: Float[Array, " m"]
+    """Coefficients of restitution."""
+
+
+def frictionless_law(system: HybridSystem, t: RealScalar, x: State) -> FrictionlessLaw:
+    """Return the directions and coefficients of impacts without friction at a state.
 
     Args:
         system: The system.
@@ -59,14 +70,14 @@ def frictionless_law(
         x: State just before an impact, shape `(n,)`.
 
     Returns:
-        Unit directions, shape `(m, n)`, and coefficients, shape `(m,)`; friction is not
-            included. Those of a constraint that does not approach, or only by a
-            rounding error, are the limits of slow impacts.
+        The law; directions and coefficients of a constraint that does not approach, or
+            only by a rounding error, are the limits of slow impacts.
     """
     after = jnp.atleast_2d(system.impact(t, x))
     before = normal_velocity(system, t, x)
     slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
-    return _law(system, t, x, before, after, _SLOW * jnp.abs(slope) @ jnp.abs(x))
+    slow = _SLOW * jnp.abs(slope) @ jnp.abs(x)
+    return FrictionlessLaw(before, slope, *_law(system, t, x, before, after, slow))
 
 
 def restitution_coefficients(system, t, x) -> Float[Array, " m"]:

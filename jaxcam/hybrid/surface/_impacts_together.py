@@ -19,16 +19,14 @@ multibody systems, Nonlinear Dynamics 7, 1995)
 `_frictional_impacts_together.py` is for contacts with friction.
 """
 
-import jax
 from jaxtyping import Array, Bool, Float
 
 from .._system import HybridSystem
 from .._types import RealScalar, State
 from ._complementary import complementary
 from ._contact_friction import has_friction
-from ._frictional_impacts_together import frictional_impacts_together, FrictionlessLaw
+from ._frictional_impacts_together import frictional_impacts_together
 from ._impacts import frictionless_law
-from ._normal import normal_velocity
 from ._restitution_bound import restitution_bound
 
 
@@ -64,14 +62,12 @@ def impacts_together(
     Returns:
         The state after the impact, shape `(n,)`.
     """
-    before = normal_velocity(system, t, x)
-    slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
-    directions, coefficients = frictionless_law(system, t, x)
+    law = frictionless_law(system, t, x)
     if has_friction(system):
-        law = FrictionlessLaw(before, slope, directions, coefficients)
         return frictional_impacts_together(system, t, x, closed, law)
-    total = joint_impulses(slope @ directions.T, before, coefficients, closed)
-    return x + total @ directions
+    matrix = law.slope @ law.directions.T
+    total = joint_impulses(matrix, law.velocities, law.coefficients, closed)
+    return x + total @ law.directions
 
 
 def joint_impulses(
