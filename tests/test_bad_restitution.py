@@ -9,7 +9,7 @@ import pytest
 
 import continuation
 import jaxcam
-from jaxcam import filippov, hybrid, maps, models, timestepping
+from jaxcam import hybrid, maps, models, timestepping
 from variational import lyapunov_spectrum, orbit_of
 
 
@@ -105,7 +105,7 @@ def test_complex_states(name):
 def test_complex_numbers_elsewhere():
     tries = [
         lambda: jax.jit(lambda x: hybrid.flow(Table(), x, 0.0, 0.1).state)(STATE + 0j),
-        lambda: filippov.simulate_filippov(models.BeltOscillator(), STATE + 0j, 0.0, 1),
+        lambda: hybrid.simulate(models.BeltOscillator(), STATE + 0j, 0.0, 1),
         lambda: maps.iterate(lambda x: x / 2, 0.3j, 4),
         lambda: models.BouncingBall(restitution=0.5j),
         lambda: continuation.branch(

@@ -11,14 +11,10 @@ from scipy.optimize import brentq
 
 import continuation
 import jaxcam
-from jaxcam.filippov import (
-    equivalent_control,
-    filippov_flow,
-    FilippovSystem,
-    simulate_filippov,
-)
+from jaxcam.filippov import equivalent_control, FilippovSystem
 from jaxcam.filippov.modes import region, sliding_field
-from jaxcam.hybrid import stroboscope
+from jaxcam.hybrid import flow, Settings, stroboscope
+from jaxcam.hybrid.record import SwitchKind
 from jaxcam.models import (
     BeltOscillator,
     PiecewiseLinear,
@@ -26,10 +22,12 @@ from jaxcam.models import (
     RelayFeedback,
 )
 from jaxcam.timestepping import relay_steps, RelaySystem
-from variational import filippov_monodromy, filippov_saltation
+from variational import switching_saltation
 
 
-ABOVE, SLIDING, BELOW = 1, 0, -1
+CROSSES, SLIDES, LEAVES = SwitchKind
+SHARP = Settings(tolerance=1e-12)
+COARSE = Settings(tolerance=1e-8)
 
 
 def largest(found, expected=0.0):
@@ -58,8 +56,8 @@ class Level(FilippovSystem):
 def test_no_crossing_is_leapt_over(power):
     """sin t crosses 1 - eps 14 times on [0, 40], however short the visits are."""
     eps = 10.0**-power
-    run = simulate_filippov(Level(1 - eps), [0.0, 1.0], 0.0, 40.0)
-    assert run.result == ""
+    run = jaxcam.simulate(Level(1 - eps), [0.0, 1.0], 0.0, 40.0)
+    assert run.successful
     rise = np.arcsin(1 - eps)
     exact = np.sort(
         [2 * np.pi * k + part for k in range(7) for part in (rise, np.pi - rise)]
@@ -67,11 +65,12 @@ def test_no_crossing_is_leapt_over(power):
     assert run.switches.count == 14
     # s; the accuracy of the run over the slope of the level
     assert np.max(np.abs(run.switches.time - exact)) < 1e-8 / np.sqrt(eps)
-    assert np.array_equal(run.switches.after, [1, -1] * 7)
+    assert np.array_equal(run.switches.direction, [1, -1] * 7)
+    assert largest(run.switches.kind, CROSSES) == 0
 
 
 def test_a_touch_from_above_is_no_switch():
-    run = simulate_filippov(Level(-1 - 1e-9), [0.0, 1.0], 0.0, 20.0)
+    run = jaxcam.simulate(Level(-1 - 1e-9), [0.0, 1.0], 0.0, 20.0, settings=SHARP)
     assert run.switches.count == 0
     exact = np.stack([np.sin([3.0, 17.5]), np.cos([3.0, 17.5])], axis=1)
     assert np.max(np.abs(run.at(jnp.array([3.0, 17.5])) - exact)) < 1e-8
@@ -82,17 +81,17 @@ def test_coulomb_friction_in_closed_form():
     f, belt = 0.4, 0.3
     system = BeltOscillator(belt=belt, friction=f, weakening=0.0)
     x0, v0 = -0.9, 0.5
-    run = simulate_filippov(system, [x0, v0], 0.0, 6.0)
+    run = jaxcam.simulate(system, [x0, v0], 0.0, 6.0, settings=SHARP)
     # x = -f + a cos(t - p) until the velocity has fallen to the belt's
     a, p = np.hypot(x0 + f, v0), np.arctan2(v0, x0 + f)
     first = brentq(lambda t: -a * np.sin(t - p) - belt, 0.0, 3.0)
     x1 = -f + a * np.cos(first - p)
     assert run.switches.time[0] == pytest.approx(first, abs=1e-9)
-    assert run.switches.after[0] == (SLIDING if abs(x1) < f else BELOW)
-    released = first + (f - x1) / belt
     assert abs(x1) < f
+    released = first + (f - x1) / belt
     assert run.switches.time[1] == pytest.approx(released, abs=1e-9)
-    assert run.switches.after[1] == BELOW
+    assert run.switches.kind[:2].tolist() == [SLIDES, LEAVES]
+    assert run.switches.direction[1] == -1
     assert run.sliding()[0] == pytest.approx([first, released], abs=1e-9)
     # then a turn about f with the belt's speed as its radius
     times = released + np.array([0.5, 1.5])
@@ -103,7 +102,7 @@ def test_coulomb_friction_in_closed_form():
 def test_stick_slip_by_another_integrator():
     """Stribeck friction: slip by DOP853 with its own event, one whole cycle."""
     system = BeltOscillator(belt=0.2, friction=1.0, weakening=3.0)
-    run = simulate_filippov(system, [1.0, 0.2], 0.0, 30.0)
+    run = jaxcam.simulate(system, [1.0, 0.2], 0.0, 30.0, settings=SHARP)
 
     def slip(t, s):
         return [s[1], 1 / (1 + 3 * (0.2 - s[1])) - s[0]]
@@ -123,12 +122,12 @@ def test_stick_slip_by_another_integrator():
     )
     stick = (1 - free.y[0, -1]) / 0.2
     period = free.t[-1] + stick
-    assert np.max(np.abs(np.diff(run.switches.time)[[0, 2]] - stick)) < 1e-8
-    assert run.switches.time[2] - run.switches.time[0] == pytest.approx(
-        period, abs=1e-8
-    )
+    phases = run.sliding()[:2]
+    assert largest(np.diff(phases), stick) < 1e-8
+    assert largest(phases[1] - phases[0], period) < 1e-8
     # every release is at the same state: the cycle forgets
-    assert largest(run.switches.state[1::2], [1.0, 0.2]) < 1e-12
+    leaves = np.asarray(run.switches.kind) == LEAVES
+    assert largest(run.switches.after[leaves], [1.0, 0.2]) < 1e-12
 
 
 def test_convex_method_is_the_equivalent_control():
@@ -153,10 +152,9 @@ def test_tangent_and_escaping():
     assert region(BeltOscillator(), 0.0, jnp.array([1.0, 0.2])) == "tangent"
     runaway = RelayFeedback([[0.0]], [-1.0], [1.0])
     assert region(runaway, 0.0, jnp.array([0.0])) == "escaping"
-    with pytest.raises(ValueError, match="not unique"):
-        simulate_filippov(runaway, [0.0], 0.0, 1.0)
-    with pytest.raises(ValueError, match="after `t0`"):
-        simulate_filippov(runaway, [1.0], 1.0, 1.0)
+    # the motion is not unique; `sides` chooses the positive side
+    run = jaxcam.simulate(runaway, [0.0], 0.0, 1.0)
+    assert float(run.final[0]) == pytest.approx(1.0)
     with pytest.raises(ValueError, match="shapes"):
         RelayFeedback(np.eye(2), [1.0], [1.0])
 
@@ -180,19 +178,19 @@ def test_relay_oscillation_in_closed_form():
 
     half = brentq(condition, 1.6, 3.0, xtol=1e-13)
     system = RelayFeedback(PLANT, INPUT, OUTPUT)
-    run = simulate_filippov(system, [1.0, 0.0, 0.0], 0.0, 80.0)
-    assert run.result == ""
+    run = jaxcam.simulate(system, [1.0, 0.0, 0.0], 0.0, 80.0, settings=SHARP)
+    assert run.successful
     assert np.max(np.abs(np.diff(run.switches.time)[-4:] - half)) < 1e-7
     # multipliers: one, and those of half a turn, projected along its last velocity
-    end, side = np.asarray(run.switches.state[-1]), float(run.switches.before[-1])
+    end, side = np.asarray(run.switches.before[-1]), -float(run.switches.direction[-1])
     velocity = PLANT @ end - side * INPUT
     onto = np.eye(3) - np.outer(velocity, OUTPUT) / (OUTPUT @ velocity)
     exact = np.linalg.eigvals(onto @ expm(PLANT * half)) ** 2
     # from a start off the surface
     t0 = float(run.switches.time[-3]) + 0.5
     (start,) = run.at(jnp.array([t0]))
-    turn = simulate_filippov(system, start, t0, t0 + 2 * half)
-    values = np.linalg.eigvals(np.asarray(filippov_monodromy(turn)))
+    turn = _jacobian(system, start, t0, t0 + 2 * half)
+    values = np.linalg.eigvals(np.asarray(turn))
     assert np.min(np.abs(values - 1)) < 1e-6
     assert largest(np.sort(np.abs(values))[:2], np.sort(np.abs(exact))[1:]) < 1e-6
 
@@ -201,8 +199,8 @@ def test_relay_by_steps_and_by_events():
     """Backward Euler with relays tends to the event-driven motion, with order one."""
     plant = np.array([[0.0, 1.0], [-1.0, -0.2]])
     system = RelayFeedback(plant, [0.0, 0.4], [0.5, 1.0])
-    exact = simulate_filippov(system, [2.0, 0.0], 0.0, 6.0)
-    assert {0} < set(np.asarray(exact.switches.after).tolist())
+    exact = jaxcam.simulate(system, [2.0, 0.0], 0.0, 6.0)
+    assert len(exact.sliding())
     stepped = RelaySystem(plant, np.array([[0.0], [0.4]]), np.array([[0.5, 1.0]]))
     errors = []
     for steps in (1000, 2000, 4000):
@@ -214,23 +212,6 @@ def test_relay_by_steps_and_by_events():
     assert np.max(np.abs(rates - 1)) < 0.15
 
 
-def test_the_main_loop_simulates_filippov_systems():
-    """The same crossings, sliding phases and states, to 1e-7 s."""
-    plant = np.array([[0.0, 1.0], [-1.0, -0.2]])
-    for system, start, end in (
-        (BeltOscillator(), [1.0, 0.0], 20.0),
-        (RelayFeedback(plant, [0.0, 0.4], [0.5, 1.0]), [2.0, 0.0], 6.0),
-        (RelayFeedback(PLANT, INPUT, OUTPUT), [1.0, 0.0, 0.0], 80.0),
-    ):
-        expected = simulate_filippov(system, start, 0.0, end)
-        run = jaxcam.simulate(system, start, 0.0, end)
-        assert run.successful, run.result
-        assert int(run.switches.count) == expected.switches.count
-        time = np.asarray(run.switches.time)[: expected.switches.count]
-        assert largest(time, expected.switches.time) < 1e-7
-        assert largest(run.final, expected.final) < 1e-7
-
-
 # Derivatives.
 
 
@@ -240,110 +221,129 @@ def forced():
     system = BeltOscillator(
         belt=0.5, friction=0.4, weakening=0.0, damping=0.05, amplitude=0.9, omega=0.7
     )
-    run = simulate_filippov(system, [0.0, 0.0], 0.0, 40 * float(system.period))
+    run = jaxcam.simulate(system, [0.0, 0.0], 0.0, 40 * float(system.period))
     return system, run.final
 
 
-_flow = eqx.filter_jit(filippov_flow)
+@eqx.filter_jit
+def _end(system, state, t0, t1):
+    return flow(system, state, t0, t1, settings=SHARP).state
 
 
-def differences(system, state, t0, t1, step=1e-5):
-    columns = []
-    for unit in np.eye(len(state)):
-        ends = [
-            np.asarray(
-                _flow(system, state + sign * step * unit, t0, t1, tolerance=1e-12)
-            )
-            for sign in (1, -1)
-        ]
-        columns.append((ends[0] - ends[1]) / (2 * step))
-    return np.stack(columns, axis=1)
+@eqx.filter_jit
+def _jacobian(system, state, t0, t1):
+    return jax.jacfwd(lambda x: flow(system, x, t0, t1, settings=SHARP).state)(state)
+
+
+def _product(system, state, period):
+    """Matrix exponentials of slip and stick, and the saltation matrices."""
+    slip = np.array([[0.0, 1.0], [-1.0, -2 * float(system.damping)]])
+    stick = np.array([[0.0, 1.0], [0.0, 0.0]])
+    run = jaxcam.simulate(system, state, 0.0, period, settings=SHARP)
+    switches = run.switches
+    assert set(np.asarray(switches.kind).tolist()) >= {SLIDES, LEAVES}
+    side, t, product = float(run.steps.sides[0, 0]), 0.0, np.eye(2)
+    for k, time in enumerate(np.asarray(switches.time)):
+        towards = float(switches.direction[k])
+        after = 0.0 if switches.kind[k] == SLIDES else towards
+        matrix = switching_saltation(
+            system, time, switches.before[k], np.array([side]), after=after
+        )
+        product = expm((slip if side else stick) * (time - t)) @ product
+        product, side, t = np.asarray(matrix) @ product, after, time
+    return expm((slip if side else stick) * (period - t)) @ product
 
 
 def test_multipliers_with_sliding_agree_with_differences(forced):
-    """Entering and leaving: multipliers of the periodic motion to 1e-6."""
+    """Entering and leaving: the monodromy matrix, three ways.
+
+    Derivative of the flow against the product of saltation matrices to 1e-9, and
+    against central differences to 1e-6.
+    """
     system, state = forced
-    period = float(system.period)
-    run = simulate_filippov(system, state, 0.0, period, tolerance=1e-12)
-    modes = np.asarray(run.switches.after).tolist()
-    assert SLIDING in modes and np.asarray(run.switches.before).tolist().count(0) >= 1
-    assert np.max(np.abs(run.final - state)) < 1e-6
-    matrix = np.asarray(filippov_monodromy(run))
-    expected = differences(system, state, 0.0, period)
-    assert np.max(np.abs(matrix - expected)) < 1e-6
-    found = np.sort(np.abs(np.linalg.eigvals(matrix)))
-    direct = np.sort(np.abs(np.linalg.eigvals(expected)))
-    assert np.max(np.abs(found - direct)) < 1e-6
+    period, step = float(system.period), 1e-5
+    assert largest(_end(system, state, 0.0, period), state) < 1e-6
+    matrix = np.asarray(_jacobian(system, state, 0.0, period))
+    assert largest(matrix, _product(system, state, period)) < 1e-9
+    for unit, column in zip(np.eye(2), matrix.T, strict=True):
+        ends = [_end(system, state + s * step * unit, 0.0, period) for s in (1, -1)]
+        assert largest((ends[0] - ends[1]) / (2 * step), column) < 1e-6
     # sliding leaves a zero
-    assert found[0] < 1e-9
+    assert np.min(np.abs(np.linalg.eigvals(matrix))) < 1e-9
 
 
-def test_a_stroboscope_of_the_main_loop(forced):
+def test_a_stroboscope_of_a_filippov_system(forced):
     """The state after one forcing period, for two belt speeds at once, to 1e-7."""
     system, state = forced
     speeds = jnp.array([0.5, 0.6])
     batch = stroboscope(system, state, 1, where=lambda s: s.belt, values=speeds)
     for k, belt in enumerate(speeds):
         one = eqx.tree_at(lambda s: s.belt, system, belt)
-        run = simulate_filippov(one, state, 0.0, float(system.period))
-        assert largest(batch.states[k, -1], run.final) < 1e-7
+        assert (
+            largest(batch.states[k, -1], _end(one, state, 0.0, float(system.period)))
+            < 1e-7
+        )
 
 
-def test_a_periodic_orbit_of_the_main_loop(forced):
-    """The same orbit and multipliers as above, to 1e-6, as one that can be followed."""
+def test_a_periodic_orbit_of_a_filippov_system(forced):
+    """Its multipliers are those of the saltation matrices, to 1e-6."""
     system, state = forced
     orbit = continuation.periodic_orbit(system, state, periods=1)
     assert [event.kind for event in orbit.signature].count("slide") == 1
-    run = simulate_filippov(system, state, 0.0, float(system.period), tolerance=1e-12)
-    expected = np.linalg.eigvals(np.asarray(filippov_monodromy(run)))
+    expected = np.linalg.eigvals(_product(system, state, float(system.period)))
     found = np.sort(np.abs(np.asarray(orbit.multipliers)))
     assert largest(found, np.sort(np.abs(expected))) < 1e-6
 
 
-@pytest.mark.slow
-def test_derivative_of_the_flow_is_the_monodromy(forced):
-    """Forward differentiation through the events, state and parameters."""
+def test_derivative_by_the_belt_speed(forced):
+    """Forward differentiation through the events, against central differences."""
     system, state = forced
-    period = float(system.period)
-    run = simulate_filippov(system, state, 0.0, period)
+    t1, step = 0.8 * float(system.period), 1e-5
 
-    @eqx.filter_jit
-    def jacobian(system, x, t1):
-        return jax.jacfwd(lambda y: filippov_flow(system, y, 0.0, t1))(x)
-
-    assert (
-        np.max(np.abs(jacobian(system, state, period) - filippov_monodromy(run))) < 1e-7
-    )
-
-    @eqx.filter_jit
-    def end(belt, t1):
+    def end(belt):
         moved = eqx.tree_at(lambda s: s.belt, system, belt)
-        return jax.jvp(
-            lambda b: filippov_flow(
-                eqx.tree_at(lambda s: s.belt, moved, b), state, 0.0, t1
-            ),
-            (belt,),
-            (jnp.ones(()),),
-        )
+        return _end(moved, state, 0.0, t1)
 
-    step = 1e-5
-    _, slope = end(jnp.asarray(0.5), 0.8 * period)
-    ends = [end(jnp.asarray(0.5 + s * step), 0.8 * period)[0] for s in (1, -1)]
-    assert np.max(np.abs(slope - (ends[0] - ends[1]) / (2 * step))) < 1e-6
+    _, slope = jax.jvp(end, (jnp.asarray(0.5),), (jnp.ones(()),))
+    ends = [end(jnp.asarray(0.5 + s * step)) for s in (1, -1)]
+    assert largest((ends[0] - ends[1]) / (2 * step), slope) < 1e-6
 
 
 def test_saltation_matrices_in_closed_form():
     """Belt oscillator: H_x = (0, 1), so S only changes the second column."""
     system = BeltOscillator(belt=0.3, friction=0.4, weakening=0.0)
-    t, state = jnp.asarray(0.0), jnp.array([0.1, 0.3])
-    entering = filippov_saltation(system, t, state, ABOVE, SLIDING)
+    up, down, held = np.array([1.0]), -1.0, 0.0
+    state = jnp.array([0.1, 0.3])
+    entering = switching_saltation(system, 0.0, state, up, after=held)
     # F- = (v, -x - f), F+ = (v, 0): the deviation of the velocity is lost
     assert largest(entering, [[1, 0], [0, 0]]) < 1e-15
     state = jnp.array([1.0, 0.3])
-    across = filippov_saltation(system, t, state, ABOVE, BELOW)
+    across = switching_saltation(system, 0.0, state, up)
     assert largest(across, [[1, 0], [0, (-1 + 0.4) / (-1 - 0.4)]]) < 1e-15
-    leaving = filippov_saltation(system, t, jnp.array([0.4, 0.3]), SLIDING, BELOW)
-    assert np.array_equal(leaving, np.eye(2))
+    state, slides = jnp.array([0.4, 0.3]), np.array([held])
+    leaving = switching_saltation(system, 0.0, state, slides, after=down)
+    assert largest(leaving, np.eye(2)) < 1e-15
+    with pytest.raises(ValueError, match="pass the side on which it continues"):
+        switching_saltation(system, 0.0, state, slides)
+
+
+class Gripped(BeltOscillator):
+    """Static friction exceeds kinetic friction."""
+
+    @property
+    def holding(self):
+        return 1.5
+
+
+def test_the_field_jumps_where_static_friction_ends():
+    """Stuck at belt speed b, released at x = 1.5 f: S = I + (F+ - F-) d_x / (d_x F-).
+
+    d falls with x alone and F- = (b, 0), F+ - F- = (0, f - 1.5 f): S21 = -f / (2 b).
+    """
+    system = Gripped(belt=0.3, friction=0.4, weakening=0.0)
+    state = jnp.array([0.6, 0.3])
+    matrix = switching_saltation(system, 0.0, state, np.zeros(1), after=-1.0)
+    assert largest(matrix[:, 0], [1.0, -0.4 / 0.6]) < 1e-12
 
 
 # Theorem 2.2.
@@ -363,7 +363,7 @@ def _growth(minus, plus, normal, angle):
     system = PiecewiseLinear(minus, plus, normal)
 
     def stretch(x, _):
-        end = filippov_flow(system, x, 0.0, 3.0, tolerance=1e-8)
+        end = flow(system, x, 0.0, 3.0, settings=COARSE).state
         size = jnp.linalg.norm(end)
         return end / size, jnp.log(size)
 
@@ -400,7 +400,7 @@ def test_periodic_planar_system():
     verdict = planar_stability(system)
     assert abs(verdict.growth) < 1e-12
     period = np.pi / 1.0 + np.pi / target
-    run = simulate_filippov(system, [0.3, 0.4], 0.0, period)
+    run = jaxcam.simulate(system, [0.3, 0.4], 0.0, period)
     assert largest(run.final, [0.3, 0.4]) < 1e-8
     assert run.switches.count == 2
 

@@ -21,9 +21,8 @@ from transformed_cases import Ball, GROUPS, MOTIONS
 
 import jaxcam
 import variational
-from jaxcam.filippov import simulate_filippov
 from jaxcam.hybrid import stroboscope
-from jaxcam.models import BeltOscillator, CamFollower, simulate_through_joints
+from jaxcam.models import CamFollower, simulate_through_joints
 
 
 _HERE = Path(__file__).parent
@@ -79,10 +78,6 @@ def _refused(function, *arguments) -> str:
         ("stroboscope", lambda x: stroboscope(CamFollower(), x, 3)),
         ("orbit_of", lambda x: variational.orbit_of(CamFollower(), x)),
         ("lyapunov_spectrum", lambda x: variational.lyapunov_spectrum(Ball(), x, 9)),
-        (
-            "simulate_filippov",
-            lambda x: simulate_filippov(BeltOscillator(), x, 0.0, 1.0),
-        ),
         (
             "simulate_through_joints",
             lambda x: simulate_through_joints(CamFollower(), x, 0.0, 1.0),

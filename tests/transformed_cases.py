@@ -10,7 +10,6 @@ from textbook_systems import BallBetweenWalls, TwoMasses
 
 import jaxcam
 import variational
-from jaxcam.filippov import filippov_flow
 from jaxcam.hybrid import flow
 from jaxcam.hybrid.surface import chatter_completion, contact_state, release_point
 from jaxcam.models import (
@@ -238,7 +237,8 @@ def _filippov(name: str) -> Case:
 
     def function(p):
         system, start, end = made(p)
-        return filippov_flow(system, start, 0.0, end, tolerance=1e-12, max_steps=2048)
+        end = flow(system, start, 0.0, end, settings=SHARP, max_steps=256)
+        return end.state
 
     return Case(function, jnp.asarray(point))
 

@@ -3,10 +3,6 @@ multipliers.
 """
 
 from ._covariant import covariant_vectors as covariant_vectors
-from ._filippov import (
-    filippov_monodromy as filippov_monodromy,
-    filippov_saltation as filippov_saltation,
-)
 from ._grazing import grazing_form as grazing_form, GrazingForm as GrazingForm
 from ._lyapunov import lyapunov_spectrum as lyapunov_spectrum
 from ._nordmark import nordmark_map as nordmark_map, nordmark_window as nordmark_window

@@ -1,10 +1,11 @@
-"""Propagate perturbations through the crossing of a switching surface."""
+"""Propagate perturbations through the events at a switching surface."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxcam.hybrid import SwitchedSystem
-from jaxcam.hybrid.surface import OnSides, resets, surfaces
+from jaxcam.hybrid.surface import InMode, Jumps, OnSides, resets, switching_distances
+from jaxcam.parameters import VectorLike
 
 from ._event_law import event_crossing
 
@@ -13,29 +14,40 @@ def switching_saltation(
     system: SwitchedSystem,
     t,
     state: Float[Array, " n"],
-    sides: Float[Array, " k"],
+    sides: VectorLike,
     surface: int = 0,
+    *,
+    after: float | None = None,
 ) -> Float[Array, "n n"]:
-    """Return the saltation matrix of the crossing of a switching surface.
+    """Return the saltation matrix of an event at a switching surface, without contacts.
 
-    With F- and F+ the branches of the vector field before and after, h the switching
-    function, and R the reset (the identity unless the system has one),
+    With F- and F+ the vector field before and after, h the switching function, and R
+    the reset (the identity unless the system has one),
 
         S = R_x + (F+ - R_t - R_x F-) h_x / (h_t + h_x F-),
 
     explicit time included. Where the field is continuous, as in a bilinear oscillator,
-    S is the identity. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, chapter 7)
+    S is the identity. At the beginning of sliding, the rank of S falls by one, because
+    perturbations are projected onto the surface. At the end of sliding, h is the
+    function that falls to zero there, and S is the identity unless `holding` exceeds
+    one. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+    Systems, 2004, chapter 7)
 
     Args:
         system: The system.
-        t: Time of the crossing (s).
-        state: State at the crossing, shape `(n,)`.
-        sides: Sides of all surfaces before the crossing, +1 or -1, shape `(k,)`.
-        surface: Index of the surface that is crossed.
+        t: Time of the event (s).
+        state: State at the event, shape `(n,)`.
+        sides: Sides of all surfaces before the event, +1 or -1, or 0 while the motion
+            slides, shape `(k,)`.
+        surface: Index of the surface of the event.
+        after: Side of this surface after the event, 0 if sliding begins; default: the
+            other side.
 
     Returns:
         Shape `(n, n)`.
+
+    Raises:
+        ValueError: The motion slides before the event and `after` is not given.
 
     Examples:
         >>> from jaxcam.models import BilinearOscillator
@@ -46,15 +58,30 @@ def switching_saltation(
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)
-    negative = jnp.asarray(sides) < 0
-    crossed = jnp.arange(negative.shape[0]) == surface
-    before, after = (OnSides(system, flags) for flags in (negative, negative ^ crossed))
+    old = jnp.asarray(sides, dtype=jnp.float64)
+    if after is None and old[surface] == 0:
+        raise ValueError(
+            "the motion slides before the event; pass the side on which it continues, "
+            "such as after=1.0"
+        )
+    new = old.at[surface].set(-old[surface] if after is None else after)
+    before, beyond = _in_mode(system, old, x), _in_mode(system, new, x)
+    sliding = old[surface] == 0 or new[surface] == 0
+    reset_from = OnSides(system, before.negative)
     law_x, moved, normal, speed = event_crossing(
-        lambda s, y: resets(before, s, y)[surface],
-        lambda s, y: surfaces(system, s, y)[surface],
+        lambda s, y: y if sliding else resets(reset_from, s, y)[surface],
+        lambda s, y: switching_distances(before, s, y)[surface],
         before.vector_field,
-        after.vector_field,
+        beyond.vector_field,
         t,
         x,
     )
     return law_x + jnp.outer(moved, normal) / speed
+
+
+def _in_mode(system: SwitchedSystem, sides, x) -> InMode:
+    """Return the system on these sides, sliding where a side is zero."""
+    every = tuple(range(x.shape[0]))
+    changed = tuple(every if side == 0 else () for side in sides)
+    flat: Bool[Array, " m"] = jnp.zeros((0,), bool)
+    return InMode(system, sides < 0, sides == 0, flat, Jumps(changed, changed))

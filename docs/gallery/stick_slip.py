@@ -5,7 +5,7 @@ converge to it."""
 import matplotlib.pyplot as plt
 import numpy as np
 
-from jaxcam.filippov import simulate_filippov
+import jaxcam
 from jaxcam.models import BeltOscillator
 from jaxcam.plotting import style
 from jaxcam.plotting.colours import CONTACT, FLIGHT
@@ -16,7 +16,7 @@ block = BeltOscillator(belt=0.3, friction=1.0, weakening=2.0, damping=0.05)
 with style():
     figure, ax = plt.subplots()
     for start in ([0.75, 0.05], [2.2, 0.0]):
-        motion = simulate_filippov(block, start, 0.0, 30.0)
+        motion = jaxcam.simulate(block, start, 0.0, 30.0)
         times = np.linspace(0.0, 30.0, 3000)
         x, velocity = np.asarray(motion.at(times)).T
         sticks = np.abs(velocity - 0.3) < 1e-9

@@ -1,4 +1,4 @@
-"""Classify the motion at the surface (crossing or sliding), and find the active
+"""Classify the motion at the surface (crossing or sliding), and find the sliding
 field.
 """
 
@@ -113,60 +113,3 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
     if above > 0:
         return "crossing up" if below > 0 else "escaping"
     return "sliding" if below > 0 else "crossing down"
-
-
-def mode_field(system: FilippovSystem, mode, t, state) -> Float[Array, " n"]:
-    """Return the active field: mode 1 above the surface, -1 below it, 0 sliding on it.
-
-    Args:
-        system: The system.
-        mode: The mode.
-        t: Time (s).
-        state: State, shape `(n,)`.
-
-    Returns:
-        Shape `(n,)`.
-    """
-    share = jnp.where(mode == 0, sliding_share(system, t, state), (mode + 1.0) / 2)
-    return share * system.above(t, state) + (1 - share) * system.below(t, state)
-
-
-def levels(system: FilippovSystem, mode, t, state) -> Float[Array, " 2"]:
-    """Return the quantities that remain positive in a mode: H, or both inward rates.
-
-    On one side of the surface, the second level is always 1.
-    """
-    above, below = surface_rates(system, t, state)
-    height = mode * system.switching(t, state)
-    sliding = jnp.stack([-above, below])
-    return jnp.where(mode == 0, sliding, jnp.stack([height, jnp.ones_like(height)]))
-
-
-def onto_surface(system: FilippovSystem, t, state) -> Float[Array, " n"]:
-    """Move the state to the surface along its gradient."""
-    value, gradient = jax.value_and_grad(system.switching, argnums=1)(t, state)
-    return state - value * gradient / jnp.sum(gradient * gradient)
-
-
-def mode_after(system: FilippovSystem, mode, level, t, state):
-    """Return the mode in which a motion continues from an event on the surface.
-
-    Motion on one side ends in crossing or sliding. Sliding ends when one of the fields
-    begins to point away from the surface; the motion then continues on the side of that
-    field.
-    """
-    above, below = surface_rates(system, t, state)
-    down = jnp.where(below < 0, -1.0, 0.0)
-    up = jnp.where(above > 0, 1.0, 0.0)
-    left = jnp.where(level == 0, 1.0, -1.0)
-    return jnp.where(mode > 0, down, jnp.where(mode < 0, up, left))
-
-
-def first_mode(system: FilippovSystem, t, state):
-    """Return the initial mode; escaping counts as above."""
-    height = system.switching(t, state)
-    above, below = surface_rates(system, t, state)
-    on = jnp.abs(height) <= 1e-12 * (1.0 + jnp.max(jnp.abs(state)))
-    slides = (above < 0) & (below > 0)
-    surface = jnp.where(slides, 0.0, jnp.where(above > 0, 1.0, -1.0))
-    return jnp.where(on, surface, jnp.where(height > 0, 1.0, -1.0))

@@ -137,6 +137,42 @@ class Trajectory(Printed):
         found = _gaps(self.system, pad(times, np.nan), pad(states, np.nan))
         return jax.device_put(np.asarray(found)[: len(times)].copy())
 
+    def sliding(self, surface: int = 0) -> Float[Array, "intervals 2"]:
+        """Return the intervals in which the motion slides along a switching surface;
+        with dry friction, the body sticks.
+
+        Args:
+            surface: Index of the surface.
+
+        Returns:
+            Start and end of each interval (s), shape `(intervals, 2)`. An interval that
+                lasts beyond the run ends at the end of the run.
+
+        Raises:
+            ValueError: The system has no such surface.
+
+        Examples:
+            >>> from jaxcam.models import BeltOscillator
+            >>> run = jaxcam.simulate(BeltOscillator(), [0.5, 0.2], 0.0, 5.0)
+            >>> run.sliding().round(6).tolist()
+            [[0.0, 2.5]]
+        """
+        refuse_tracers("sliding", "trajectory.steps.sides", self)
+        count = int(self.steps.count)
+        sides = np.zeros((count, 0)) if self.steps.sides is None else self.steps.sides
+        sides = np.asarray(sides)[:count]
+        if not 0 <= surface < sides.shape[1]:
+            raise ValueError(
+                f"surface {surface} does not exist: {type(self.system).__name__} has "
+                f"{sides.shape[1]} switching surfaces, counted from 0"
+            )
+        time, slides = np.asarray(self.steps.time)[:count], sides[:, surface] == 0
+        # the last point only ends an interval
+        slides[-1] = False
+        earlier = np.append(False, slides[:-1])
+        found = np.stack([time[slides & ~earlier], time[~slides & earlier]], axis=1)
+        return jnp.asarray(found[found[:, 1] > found[:, 0]])
+
     def stroboscopic(self, period=None, phase=0.0) -> Float[Array, "k n"]:
         """Return the states at t0 + phase + k period.
 

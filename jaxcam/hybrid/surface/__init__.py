@@ -71,6 +71,7 @@ from ._sliding import (
     settled as settled,
     slack_of_hold as slack_of_hold,
     switched_rounding as switched_rounding,
+    switching_distances as switching_distances,
 )
 from ._switches import (
     OnSides as OnSides,

@@ -221,7 +221,7 @@ def slack_of_hold(mode: OnSides) -> Float[Array, " k"]:
     return (_of_each(mode.system.holding, mode) - 1.0) / 2
 
 
-def distances(mode: InMode, t, x) -> Float[Array, " k"]:
+def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
     """Return the distance of each surface, zero at a crossing or at the end of sliding,
     shape `(k,)`.
     """
@@ -298,12 +298,12 @@ def field_and_distances_in_mode(mode: InMode, t, x) -> tuple[State, Distances]:
         held = slide_terms(mode, t, x).still
         for i, k in enumerate(mode.slidable):
             still[k] = held[i]
-    own = distances(mode, t, x)
+    own = switching_distances(mode, t, x)
     return field, Distances(gaps(mode, t, x), multipliers, own, jnp.stack(still))
 
 
 def switched_rounding(mode: InMode, t, x, reach: State):
     """Return the rounding errors of the gaps, then of the distances of surfaces."""
-    own = rounding_of(lambda s, y: distances(mode, s, y), t, x, reach)
+    own = rounding_of(lambda s, y: switching_distances(mode, s, y), t, x, reach)
     gaps = gap_rounding(mode, t, x, reach)
     return jnp.concatenate([gaps, own]) if gaps.shape[0] else own

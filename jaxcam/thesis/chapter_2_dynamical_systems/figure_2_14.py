@@ -12,8 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...filippov import FilippovTrajectory, simulate_filippov
 from ...filippov.modes import surface_rates
+from ...hybrid import simulate, Trajectory
+from ...hybrid.record import Switches, SwitchKind
 from ...models import BeltOscillator, CamFollower
 from ...plotting.colours import CONTACT, FLIGHT, IMPACT
 from ..progress import counted
@@ -37,22 +38,26 @@ class Belted(NamedTuple):
     stuck: float
     crossings: int
     """Number of surface crossings without sticking."""
-    run: FilippovTrajectory
+    run: Trajectory
 
 
 def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
     """Return the motion after some periods of the forcing."""
     system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(float(belt)))
     period = float(system.period)
-    settled = simulate_filippov(system, state, 0.0, turns * period).final
-    run = simulate_filippov(system, settled, 0.0, period)
+    settled = simulate(system, state, 0.0, turns * period).final
+    run = simulate(system, settled, 0.0, period)
     held = np.asarray(run.sliding())
-    before, after = np.asarray(run.switches.before), np.asarray(run.switches.after)
-    crossed = int(np.sum((before != 0) & (after != 0)))
+    crossed = int(np.sum(np.asarray(_switches(run).kind) == SwitchKind.CROSSES))
     times = np.linspace(0.0, period, 400)
     highest = float(np.max(np.asarray(run.at(jnp.asarray(times)))[:, 1]))
     stuck = float(np.sum(held[:, 1] - held[:, 0])) / period if len(held) else 0.0
     return Belted(float(belt), highest, stuck, crossed, run)
+
+
+def _switches(run: Trajectory) -> Switches:
+    assert run.switches is not None
+    return run.switches
 
 
 @cache
@@ -123,10 +128,13 @@ def _rate_beyond(belt: float, name: str) -> float:
     side = {"switching-sliding": -1, "crossing-sliding": 1}.get(name)
     if side is None or not np.isfinite(belt):
         return np.nan
-    run = belted(belt, turns=2 * _SETTLE).run
-    switches = run.switches
-    k = int(np.flatnonzero(np.asarray(switches.before) == side)[0])
-    above, below = surface_rates(run.system, switches.time[k], switches.state[k])
+    switches = _switches(belted(belt, turns=2 * _SETTLE).run)
+    # it arrives from this side
+    arrives = np.asarray(switches.kind) != SwitchKind.LEAVES
+    from_side = np.asarray(switches.direction) == -side
+    k = int(np.flatnonzero(arrives & from_side)[0])
+    system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(belt))
+    above, below = surface_rates(system, switches.time[k], switches.before[k])
     return float(above if side < 0 else below)
 
 
