@@ -159,6 +159,21 @@ def test_the_gain_does_not_depend_on_the_point():
     assert there.gain + lost == pytest.approx(here.gain, abs=1e-6)
 
 
+def test_information_that_rounding_has_made_negative_counts_as_none():
+    """The Occam factor is that of the other coefficients; the sum did not converge."""
+    family = _family(Variable.POSITION, 0.0, 1.0)
+    own, none = np.arange(SINES + 1), np.zeros(0, dtype=int)
+    spread = np.sqrt(family.variances(SINES, 0.3))
+    information = np.diag([*np.linspace(5.0, 1.0, SINES), 1.0])
+    seen = occam(information, none, own[1:-1], spread[1:], POLICY.alike)
+    information[0, 0] = -1e-12
+    price = occam(information, none, own[:-1], spread, POLICY.alike)
+    assert price == pytest.approx(seen, rel=1e-12)
+    zero = np.zeros(SINES + 1)
+    gain = roughness(information, zero, none, own, family, zero, POLICY).gain
+    assert np.isfinite(gain)
+
+
 def test_what_free_parameters_imitate_is_no_function():
     """Its gain is nothing beside chi-square one, that of a parameter by chance."""
     rng = np.random.default_rng(4)

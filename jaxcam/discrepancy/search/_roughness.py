@@ -84,7 +84,8 @@ def beside(information, score, free, own, alike: float):
     across = information[np.ix_(own, free)]
     inside = information[np.ix_(own, own)] - across @ inverse @ across.T
     pull = score[own] - across @ (inverse @ score[free])
-    size = np.sqrt(np.diag(information)[own])
+    # rounding may leave a little less than no information
+    size = np.sqrt(np.maximum(np.diag(information)[own], 0.0))
     unit = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
     values, vectors = np.linalg.eigh(inside * np.outer(unit, unit))
     seen = values > alike
