@@ -29,6 +29,7 @@ from ._restitution import (
     LinearInSpeed as LinearInSpeed,
     PowerLawRestitution as PowerLawRestitution,
 )
+from ._rocking_block import RockingBlock as RockingBlock
 from ._spinning_ball import SpinningBall as SpinningBall
 from ._through_joints import simulate_through_joints as simulate_through_joints
 from ._triple_integrator import TripleIntegrator as TripleIntegrator
