@@ -55,7 +55,7 @@ def test_impacts_of_a_stout_block_by_another_integrator():
 
 
 def test_a_block_that_ceases_to_rock():
-    """Housner's half periods 2 artanh(r^n u): they sum to the time of rest, to 1e-5 s."""
+    """Half periods 2 artanh(r^n u); they end in rest after their sum, to 1e-5 s."""
     start, r = 0.4, 0.8
     block = slender(restitution=r)
     run = jaxcam.simulate(block, block.rocking(start * SLENDER), 0.0, 5.0)

@@ -139,8 +139,8 @@ class RockingBlock(HybridSystem):
         if not bool(jnp.all(self.restitution < 1)):
             largest = float(jnp.max(self.restitution))
             raise ValueError(
-                f"restitution is {largest:g}; it must be below 1, because a block loses "
-                "energy when it changes corner"
+                f"restitution is {largest:g}; it must be below 1, because a block "
+                "loses energy when it changes corner"
             )
 
     @property
