@@ -246,6 +246,12 @@ _ARRAYS = {
         *x.at[1:3].min(0.1),
     ],
     "looked up": lambda x: [x[_index(x)], x.reshape(2, 3)[1, _index(x) % 3]],
+    "several looked up": lambda x: [
+        *x[_indices(x)],
+        *jnp.ravel(x.reshape(2, 3)[_indices(x) % 2]),
+        *jnp.ravel(x.reshape(3, 2)[:, _indices(x) % 2]),
+    ],
+    "repeated": lambda x: [*jnp.tile(x[:2], 3)],
     "beyond": lambda x: [x[_index(x) + 4], x.at[_index(x) * 3].get(mode="clip")],
     "slice": lambda x: [*lax.dynamic_slice(x, (_index(x),), (2,))],
     "put": lambda x: [*lax.dynamic_update_slice(x, x[:2], (_index(x),))],
@@ -257,6 +263,10 @@ _ARRAYS = {
 
 def _index(x):
     return jnp.clip(jnp.floor(jnp.abs(x[0]) * 2), 0, 5).astype(jnp.int32)
+
+
+def _indices(x):
+    return jnp.stack([_index(x), _index(x) // 2, 5 - _index(x)])
 
 
 @pytest.mark.parametrize("name", _ARRAYS)

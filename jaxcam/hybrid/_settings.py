@@ -64,7 +64,7 @@ class Settings(eqx.Module):
     reverse mode. It serves as a check of these passes, and as a fallback if one fails.
     """
 
-    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="xla", static=True)
+    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="auto", static=True)
     """Compiler for runs that are not traced: `"xla"`, which is also used for all traced
     runs and derivatives; `"llvm"`, which is faster but rejects a system with an
     unsupported operation; or `"auto"`, LLVM if possible, otherwise XLA. Results differ

@@ -22,7 +22,7 @@ from ._writer import Lacking, Writer
 MOVES = frozenset(
     """
     broadcast_in_dim concatenate copy dynamic_slice dynamic_update_slice expand_dims
-    gather pad rev reshape scatter slice split squeeze stack transpose
+    gather pad rev reshape scatter slice split squeeze stack tile transpose
     """.split()
 )
 # maximum number of values that a scatter may combine: the bits of a float
@@ -141,17 +141,34 @@ def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
     name = equation.primitive.name
     if name in ("dynamic_slice", "dynamic_update_slice"):
         return _sliced(w, equation, inputs, dtypes)
-    if name != "gather" or inputs[1].ndim != 1:
+    if name != "gather":
         raise Lacking(name)
     numbers = equation.params["dimension_numbers"]
     if numbers.operand_batching_dims or numbers.start_indices_batching_dims:
         raise Lacking("gather of a batch")
+    if inputs[1].ndim != 1:
+        return [_each_looked_up(w, equation, inputs, dtypes)]
     shape, sizes = inputs[0].shape, equation.params["slice_sizes"]
     room = [shape[d] - sizes[d] + 1 for d in numbers.start_index_map]
     # outside the array, use the fill value or the nearest element
     mode = str(equation.params["mode"]).upper()
     clips = "FILL" not in mode
     return _by_comparison(w, equation, inputs, (1,), room, clips, dtypes)
+
+
+@no_type_check
+def _each_looked_up(w: Writer, equation, inputs, dtypes) -> np.ndarray:
+    """Emit a gather of several index vectors, one by one."""
+    array, indices = inputs
+    numbers = equation.params["dimension_numbers"]
+    alone = numbers._replace(offset_dims=tuple(range(len(numbers.offset_dims))))
+    single = equation.replace(params={**equation.params, "dimension_numbers": alone})
+    vectors = indices.reshape(-1, indices.shape[-1])
+    parts = [looked_up(w, single, [array, v], dtypes)[0] for v in vectors]
+    shape = *indices.shape[:-1], *parts[0].shape
+    found = np.concatenate([part.ravel() for part in parts]).reshape(shape)
+    rest = [d for d in range(found.ndim) if d not in numbers.offset_dims]
+    return np.moveaxis(found, range(found.ndim), [*rest, *numbers.offset_dims])
 
 
 @no_type_check
