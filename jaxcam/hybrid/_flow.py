@@ -80,11 +80,11 @@ def flow(
     """
     state = real_array(state)
     system = as_arrays(system)
-    if not is_traced((system, state, t0)) and not is_tracing():
-        check_system(system, jnp.asarray(t0, jnp.float64), state)
     if settings is None:
         settings = Settings(solver=diffrax.Dopri8())
     settings = as_arrays(settings)
+    if not is_traced((system, state, t0)) and not is_tracing():
+        check_system(system, jnp.asarray(t0, jnp.float64), state, settings)
     t0, t1 = jnp.asarray(t0, jnp.float64), jnp.asarray(t1, jnp.float64)
     run = _flow if settings.plain else whole(_flow)
     return run(system, settings, state, t0, t1, max_steps)

@@ -4,6 +4,7 @@ from typing import Literal
 
 import diffrax
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
@@ -65,16 +66,18 @@ class Settings(eqx.Module):
     """
 
     backend: Literal["auto", "llvm", "xla"] = eqx.field(default="auto", static=True)
-    """Compiler for runs that are not traced: `"xla"`, which is also used for all traced
-    runs and derivatives; `"llvm"`, which is faster but rejects a system with an
-    unsupported operation; or `"auto"`, LLVM if possible, otherwise XLA. Results differ
-    only by rounding.
+    """Compiler for runs that are not traced: `"llvm"`, which is faster but rejects a
+    system with an unsupported operation; `"xla"`, which is also used for all traced
+    runs and derivatives; or `"auto"`, LLVM if possible, otherwise XLA (also if JAX runs
+    on another device than the CPU). Results differ only by rounding.
     """
 
     @property
     def compiles(self) -> bool:
         """Return whether LLVM compiles a run that is not traced."""
-        return self.backend != "xla" and not self.plain
+        if self.plain or self.backend == "xla":
+            return False
+        return self.backend == "llvm" or jax.default_backend() == "cpu"
 
     def check(self) -> None:
         """Raise `ValueError` if a setting is outside its range.

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
-from .backend import attempts_of, key_of, Lacking, laid_out, say_lacking
+from ._prepared import prepared
+from .backend import attempts_of, key_of, Lacking, laid_out, Rowwise, say_lacking
 from .codes import RUNNING
 from .loop import (
     first_state,
@@ -45,7 +46,10 @@ def run_untraced(
 
 def prepare(system, settings, t0, state, t1, differentiable):
     """Return the functions, the plan and the first state of a run."""
-    system = system.prepared()
+    return _started(system.prepared(), settings, t0, state, t1, differentiable)
+
+
+def _started(system, settings, t0, state, t1, differentiable):
     functions = Functions(system, state.shape[0], settings.plain)
     plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)
     x = tuple(state[i] for i in range(state.shape[0]))
@@ -58,10 +62,14 @@ def _said(progress, t, t0, t1) -> None:
         progress((float(t) - float(t0)) / max(float(t1) - float(t0), 1e-300))
 
 
-@eqx.filter_jit
-def _start(system, settings, t0, state, t1):
-    _, plan, carried = prepare(system, settings, t0, state, t1, False)
-    return (system.prepared(), plan), jax.tree.map(jnp.asarray, carried)
+def _start(case, _=None):
+    """Return the plan and the first state of a run of a prepared system."""
+    system, settings, t0, state, t1 = case
+    _, plan, carried = _started(system, settings, t0, state, t1, False)
+    return plan, jax.tree.map(jnp.asarray, carried)
+
+
+_start_by_llvm, _start_by_xla = Rowwise(_start, width=1), eqx.filter_jit(_start)
 
 
 def _row(record, lane: LoopState):
@@ -70,8 +78,13 @@ def _row(record, lane: LoopState):
 
 
 def _by_llvm(system, settings, t0, state, t1, budget, progress):
-    parts, carried = _start(system, settings, t0, state, t1)
-    arrays, static = eqx.partition(parts, eqx.is_array)
+    system = prepared(system)
+    case = system, settings, t0, state, t1
+    try:
+        plan, carried = _start_by_llvm.once(case)
+    except Lacking:
+        plan, carried = _start_by_xla(case)
+    arrays, static = eqx.partition((system, plan), eqx.is_array)
     shared, layout = laid_out(arrays)
     _, nothing = laid_out(jax.tree.map(lambda _: None, arrays))
     numbers, lane = laid_out(carried)

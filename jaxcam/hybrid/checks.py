@@ -1,6 +1,9 @@
 """Detect invalid input before anything is compiled; each message names the fix."""
 
+import contextlib
 import hashlib
+from collections.abc import Callable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,6 +15,7 @@ from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 from ._settings import Settings
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
+from .backend import Lacking, Rowwise
 from .loop import starts_behind
 from .surface import check_restitution, restitutions
 
@@ -65,8 +69,8 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
             f"t1 = {float(t1):g} s is before t0 = {float(t0):g} s; time runs forward, "
             "so interchange them"
         )
-    check_system(system, t0, state)
-    behind, values = map(np.asarray, _starts_behind(system, t0, state))
+    check_system(system, t0, state, settings)
+    behind, values = _evaluated(_STARTS_BEHIND, settings, system, t0, state)
     if not np.all(np.isfinite(values)):
         raise ValueError("the gap is not finite at t0; check the state and parameters")
     if behind:
@@ -76,8 +80,28 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
         )
 
 
-_starts_behind = eqx.filter_jit(starts_behind)
-_restitutions = eqx.filter_jit(restitutions)
+class _ByBoth(NamedTuple):
+    """A function of (system, time, state), compiled by LLVM and by XLA."""
+
+    llvm: Rowwise
+    xla: Callable
+
+    @staticmethod
+    def of(function) -> "_ByBoth":
+        by_llvm = Rowwise(lambda case, _: function(*case), width=1)
+        return _ByBoth(by_llvm, eqx.filter_jit(function))
+
+
+_STARTS_BEHIND, _RESTITUTIONS = _ByBoth.of(starts_behind), _ByBoth.of(restitutions)
+
+
+def _evaluated(function: _ByBoth, settings: Settings, *case):
+    """Return the results for values that are not traced, as NumPy arrays."""
+    if settings.compiles:
+        with contextlib.suppress(Lacking):
+            return function.llvm.once(case)
+    return jax.tree.map(np.asarray, function.xla(*case))
+
 
 # systems that passed, because a check takes as long as a short run: by their shapes,
 # and by all their numbers
@@ -86,7 +110,7 @@ _SOUND: set = set()
 _MANY = 1000
 
 
-def check_system(system, t0, state) -> None:
+def check_system(system, t0, state, settings: Settings) -> None:
     """Raise `ValueError` for an invalid parameter or function of the system."""
     signature = _signature(system, state)
     numbers = signature, _digest(system)
@@ -102,7 +126,7 @@ def check_system(system, t0, state) -> None:
     system.check()
     if isinstance(system, SwitchedSystem):
         _check_switches(system)
-    check_restitution(system, _restitutions(system, t0, state))
+    check_restitution(system, _evaluated(_RESTITUTIONS, settings, system, t0, state))
     if signature is not None:
         _WELL_SHAPED.add(signature)
         if len(_SOUND) >= _MANY:

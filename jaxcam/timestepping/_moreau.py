@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..hybrid import HybridSystem
+from ..hybrid import HybridSystem, Settings
 from ..hybrid.checks import check_system
 from ..hybrid.surface import gaps, impacts, normal_directions, normal_velocity
 from ..parameters import as_arrays, real_array, VectorLike
@@ -96,7 +96,7 @@ def moreau(
     if not (steps >= 1 and t1 > t0):
         raise ValueError("Give a `t1` after `t0` and at least one step.")
     system = as_arrays(system)
-    check_system(system, jnp.asarray(t0), state)
+    check_system(system, jnp.asarray(t0), state, Settings())
     h = jnp.asarray((t1 - t0) / steps)
     start = jnp.asarray(t0)
     states, pushes, distances, codes = in_chunks(

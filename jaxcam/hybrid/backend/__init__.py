@@ -11,10 +11,10 @@ from ._attempts import (
     Attempts as Attempts,
     attempts_of as attempts_of,
     key_of as key_of,
-    laid_out as laid_out,
-    Layout as Layout,
     say_lacking as say_lacking,
 )
+from ._layout import laid_out as laid_out, Layout as Layout
 from ._machine import user_cache as user_cache, vector_width as vector_width
 from ._mapped import Mapped as Mapped
+from ._rowwise import Rowwise as Rowwise
 from ._writer import Lacking as Lacking

@@ -14,8 +14,9 @@ from jax.interpreters import partial_eval
 
 from ..loop import Functions, iteration, LoopState
 from ._kernel import ENTRY, module_of, Program
+from ._layout import Layout
 from ._machine import Compiled, compiled
-from ._writer import kind_of, Lacking
+from ._writer import Lacking
 
 
 # rounds per call; between calls, Python can be interrupted or show progress
@@ -31,50 +32,6 @@ _ARGUMENTS = (
 )
 _LOG = logging.getLogger("jaxcam")
 _SAID: set[str] = set()
-
-
-class Layout(NamedTuple):
-    """Positions of the arrays of a pytree in a vector of numbers; hashable."""
-
-    structure: Any
-    shapes: tuple
-    dtypes: tuple
-
-    @property
-    def size(self) -> int:
-        return sum(int(np.prod(shape)) for shape in self.shapes)
-
-    def tree(self, numbers):
-        """Return the pytree of these numbers, `(size,)`."""
-        leaves, first = [], 0
-        for shape, dtype in zip(self.shapes, self.dtypes, strict=True):
-            last = first + int(np.prod(shape))
-            leaves.append(numbers[first:last].reshape(shape).astype(dtype))
-            first = last
-        return jax.tree.unflatten(self.structure, leaves)
-
-
-def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
-    """Return the arrays of a pytree as 64-bit floats: `(size,)`, or `(elements, size)`.
-
-    **Raises:** `Lacking` if an element is not a number.
-    """
-    leaves, structure = jax.tree.flatten(tree)
-    rows, shapes, dtypes = [], [], []
-    number, head = (1, 0) if lanes is None else (lanes, 1)
-    for array in leaves:
-        # a random key is also an array
-        kind_of(array.dtype)
-        leaf = np.asarray(array)
-        floats = leaf.astype(np.float64)
-        if leaf.dtype.kind in "iu" and np.any(np.abs(floats) > 2.0**53):
-            raise Lacking("integers above 2^53")
-        rows.append(floats.reshape(number, -1))
-        shapes.append(leaf.shape[head:])
-        dtypes.append(leaf.dtype)
-    numbers = np.concatenate([np.zeros((number, 0)), *rows], axis=1)
-    layout = Layout(structure, tuple(shapes), tuple(dtypes))
-    return np.ascontiguousarray(numbers[0] if lanes is None else numbers), layout
 
 
 class Key(NamedTuple):

@@ -73,8 +73,12 @@ class Emitter:
         if name in MOVES and has_known_indices(equation, inputs):
             return moved(equation, inputs)
         if inputs and all(map(known, inputs)):
-            made = computed(equation, [join_known(i) for i in inputs])
-            return [boxed(m) for m in made]
+            # an empty array has no element that tells its type
+            arrays = [
+                join_known(i) if i.size else np.empty(i.shape, d)
+                for i, d in zip(inputs, dtypes, strict=True)
+            ]
+            return [boxed(m) for m in computed(equation, arrays)]
         if not inputs:
             return [boxed(m) for m in computed(equation, [])]
         if name in ELEMENTWISE:

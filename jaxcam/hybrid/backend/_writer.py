@@ -4,6 +4,7 @@ A value that is the same for all batch elements stays a scalar, so that the comp
 moves computations with such values out of the loop.
 """
 
+import functools
 from typing import Any
 
 import llvmlite.ir as ir
@@ -28,6 +29,7 @@ class Lacking(Exception):
     """The name of an operation that a program needs and this backend does not have."""
 
 
+@functools.cache
 def kind_of(dtype) -> Any:
     """Return the LLVM type of a scalar."""
     if str(dtype) not in _KINDS:

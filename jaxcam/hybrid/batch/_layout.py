@@ -5,6 +5,7 @@ batch element instead would take four times as long: as long as 64 elements need
 chunk.
 """
 
+import contextlib
 import functools
 from collections.abc import Callable, Hashable
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._system import HybridSystem
+from ..backend import Lacking, Rowwise
 from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
 from ..lowering import one_kernel, Packed, without_library
 
@@ -45,7 +47,8 @@ class LaneLayout(NamedTuple):
 
 def packed(lane: LoopState):
     """Return all numbers of one or more batch elements as rows of 64-bit floats."""
-    return jnp.stack([jnp.asarray(leaf, jnp.float64) for leaf in jax.tree.leaves(lane)])
+    xp = np if isinstance(jax.tree.leaves(lane)[0], np.ndarray) else jnp
+    return xp.stack([xp.asarray(leaf, xp.float64) for leaf in jax.tree.leaves(lane)])
 
 
 def layout_of(lane: LoopState) -> LaneLayout:
@@ -110,12 +113,14 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneSta
         part = None if lanes.values is None else lanes.values[some]
         batched, shared = split_lanes(lanes.system, lanes.where, part)
         state = jnp.asarray(lanes.states[some])
-        shape = horizon.period, horizon.t0, whole, settings, state
-        pieces.append(_start(batched, shared, *shape))
-    slots, _, _, rest = pieces[0]
+        span = horizon.period, horizon.t0, whole
+        own, rest = _ready(batched, shared, *span, settings)
+        lane = _first(settings.compiles, horizon.t0, own, rest, state)
+        pieces.append((lane, own))
+    slots = layout_of(pieces[0][0])
     shared, static = eqx.partition(rest, eqx.is_array)
-    numbers = np.concatenate([numbers for _, numbers, _, _ in pieces], axis=1)
-    each = [own for _, _, own, _ in pieces]
+    numbers = np.concatenate([np.asarray(packed(lane)) for lane, _ in pieces], axis=1)
+    each = [own for _, own in pieces]
     own = jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *each)
     return LaneStart(slots, numbers[:, :count], own, shared, static)
 
@@ -190,10 +195,8 @@ def split_lanes(system, where, values):
 
 
 @eqx.filter_jit
-def _start(batched, shared, period, t0, turns, settings, states):
-    """Return layout and numbers, and system and plan split into own and shared
-    parts.
-    """
+def _ready(batched, shared, period, t0, turns, settings):
+    """Return system and plan, split into own and shared parts."""
 
     def prepared(batched):
         system = eqx.combine(batched, shared).prepared()
@@ -218,19 +221,35 @@ def _start(batched, shared, period, t0, turns, settings, states):
         differs = _depends(prepared, jax.tree.map(lambda p: p[0], batched))
         own, rest = eqx.partition(ready, differs)
         rest = jax.tree.map(lambda p: p[0] if eqx.is_array(p) else p, rest)
-    found = []
+    return own, rest
 
-    def first(own, state):
-        system, plan = eqx.combine(own, rest)
-        x = tuple(state[i] for i in range(state.shape[0]))
-        functions = Functions(system, len(x), plan.plain)
-        limits = plan.t1, plan.longest_step, plan.repeat
-        lane = first_state(functions, t0, x, *limits)
-        found.append(layout_of(lane))
-        return packed(lane)
 
-    numbers = jax.vmap(first, in_axes=(0, 0), out_axes=1)(own, states)
-    return found[0], numbers, own, rest
+def _first_of(shared, row) -> LoopState:
+    """Return the first state of one batch element."""
+    (t0, rest), (own, state) = shared, row
+    system, plan = eqx.combine(own, rest)
+    x = tuple(state[i] for i in range(state.shape[0]))
+    functions = Functions(system, len(x), plan.plain)
+    limits = plan.t1, plan.longest_step, plan.repeat
+    lane = first_state(functions, t0, x, *limits)
+    return jax.tree.map(jnp.asarray, lane)
+
+
+_first_by_llvm = Rowwise(_first_of)
+
+
+@eqx.filter_jit
+def _first_by_xla(shared, rows):
+    return jax.vmap(lambda row: _first_of(shared, row))(rows)
+
+
+def _first(compiles: bool, t0, own, rest, states) -> LoopState:
+    """Return the first states of batch elements."""
+    shared, rows = (jnp.asarray(t0, jnp.float64), rest), (own, states)
+    if compiles:
+        with contextlib.suppress(Lacking):
+            return _first_by_llvm(shared, rows, len(states))
+    return _first_by_xla(shared, rows)
 
 
 def _depends(function: Callable, argument):

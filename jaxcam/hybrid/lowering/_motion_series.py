@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from ._jaxprs import without_unused
-from ._scalarise import evaluated, traced
+from ._scalarise import evaluated, SplitProgram, traced
 from ._scalars import Memory, once
 from ._taylor import coefficient, Series
 
@@ -22,7 +22,7 @@ class MotionSeries(NamedTuple):
     """The other results of the program, and their first, second, ... derivatives."""
 
 
-def motion_series(function: Callable, orders, *example) -> Callable:
+def motion_series(function: Callable, orders, *example) -> SplitProgram:
     """Return the time derivatives of functions along a motion.
 
     **Arguments:** `function(parameters, t, x, *rest)` of arrays, which returns the
@@ -40,10 +40,7 @@ def motion_series(function: Callable, orders, *example) -> Callable:
     field = without_unused(closed, [True] + [False] * number)
     rest = without_unused(closed, [False] + [True] * number)
 
-    def call(
-        parameters, t, x, *arguments, memory: Memory | None = None
-    ) -> MotionSeries:
-        memory = Memory() if memory is None else memory
+    def call(parameters, t, x, *arguments, memory: Memory) -> MotionSeries:
         (x,) = jax.tree.leaves(x)
         powers = [[e] for e in x]
 
@@ -81,7 +78,7 @@ def motion_series(function: Callable, orders, *example) -> Callable:
             rates.append(traced(rate, memory))
         return MotionSeries(rates, along)
 
-    return call
+    return SplitProgram(call, closed)
 
 
 def _derivative(elements: np.ndarray, order: int, memory) -> np.ndarray:

@@ -58,6 +58,19 @@ _PRIMITIVES = {
 }
 
 
+class SplitProgram:
+    """A traced function of split arguments."""
+
+    def __init__(self, call: Callable, *programs):
+        self._call = call
+        constants = [value for program in programs for value in program.consts]
+        # whether it may be used in any trace
+        self.portable = not any(isinstance(value, Tracer) for value in constants)
+
+    def __call__(self, *arguments, memory: Memory | None = None):
+        return self._call(*arguments, memory=Memory() if memory is None else memory)
+
+
 def joined(function: Callable) -> Callable:
     """Convert a `function` of arrays to split arrays, by joining its arguments."""
 
@@ -67,7 +80,7 @@ def joined(function: Callable) -> Callable:
     return call
 
 
-def scalarise(function: Callable, *example) -> Callable:
+def scalarise(function: Callable, *example) -> SplitProgram:
     """Evaluate `function` on split arguments and return split results.
 
     **Arguments:** the function of arrays, and examples of its arguments (pytrees of
@@ -80,12 +93,11 @@ def scalarise(function: Callable, *example) -> Callable:
     closed = without_unused(closed)
     treedef = jax.tree.structure(shape)
 
-    def call(*arguments, memory: Memory | None = None):
-        memory = Memory() if memory is None else memory
+    def call(*arguments, memory: Memory):
         outputs = evaluated(closed, jax.tree.leaves(arguments), memory)
         return jax.tree.unflatten(treedef, [traced(o, memory) for o in outputs])
 
-    return call
+    return SplitProgram(call, closed)
 
 
 def evaluated(closed, leaves, memory: Memory) -> list[np.ndarray]:

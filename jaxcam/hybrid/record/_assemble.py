@@ -1,5 +1,6 @@
 """Convert the log of a run to impacts, contacts and steps."""
 
+import contextlib
 from types import ModuleType
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._switched import SwitchedSystem
+from ..backend import Lacking, Rowwise
 from ..codes import RowKind
 from ..loop import Log, rows_of_kind
 from ..surface import normal_velocity, surfaces
@@ -30,12 +32,21 @@ class Parts(NamedTuple):
 
 
 def assemble(
-    system, t0, state, mode, log: Log, sizes: tuple[int, int], xp: ModuleType = jnp
+    system,
+    t0,
+    state,
+    mode,
+    log: Log,
+    sizes: tuple[int, int],
+    xp: ModuleType = jnp,
+    *,
+    compiles: bool = False,
 ) -> Parts:
     """Sort the rows of a log into impacts, contacts, steps and crossings of fixed
     lengths; `mode` are the flags at the start.
 
-    With `xp=numpy`, a log that is not traced is sorted without compilation.
+    With `xp=numpy`, a log that is not traced is sorted without compilation. Functions
+    of the system are then compiled by LLVM if it `compiles`.
     """
     rows = log.kind.shape[0]
     k = _surfaces(system, t0, state)
@@ -56,7 +67,7 @@ def assemble(
     switches = _switches(xp, log, m, sizes[0]) if k else None
     if not m:
         return Parts(*_nothing(xp, state, log), steps, switches)
-    impacts = _impacts(xp, system, log, sizes[0])
+    impacts = _impacts(xp, system, log, sizes[0], compiles)
     return Parts(impacts, _contacts(xp, time, kept, count, sizes[1]), steps, switches)
 
 
@@ -102,7 +113,9 @@ def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
     )
 
 
-def _impacts(xp: ModuleType, system, log: Log, max_impacts: int) -> Impacts:
+def _impacts(
+    xp: ModuleType, system, log: Log, max_impacts: int, compiles: bool
+) -> Impacts:
     hits = rows_of_kind(log, RowKind.IMPACT, RowKind.LAST_IMPACT)
     number = xp.sum(hits)
     index = _places(xp, hits, max_impacts, 0)
@@ -112,7 +125,7 @@ def _impacts(xp: ModuleType, system, log: Log, max_impacts: int) -> Impacts:
     after = xp.where(real[:, None], log.after[index], xp.nan)
     which = xp.where(real, log.constraint[index], 0.0).astype(xp.int32)
     sides = log.before[index], log.after[index]
-    speeds = _speeds(xp, system, log.t[index], sides, which)
+    speeds = _speeds(xp, system, log.t[index], sides, which, compiles)
     hit, left = (xp.where(real, speed, xp.nan) for speed in speeds)
     return Impacts(t_hit, before, after, which, hit, left, number)
 
@@ -158,7 +171,7 @@ def _least_to_come(xp: ModuleType, values):
     return np.minimum.accumulate(values[::-1])[::-1]
 
 
-def _speeds(xp: ModuleType, system, times, sides, which):
+def _speeds(xp: ModuleType, system, times, sides, which, compiles: bool):
     """Return the normal velocities at the constraints that were hit, before or after
     impacts.
     """
@@ -167,6 +180,11 @@ def _speeds(xp: ModuleType, system, times, sides, which):
         return times, times
     times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
     states = xp.concatenate(sides)
+    if xp is np and compiles:
+        with contextlib.suppress(Lacking):
+            points = times, states, which
+            speeds = _VELOCITIES(system, points, 2 * count)
+            return speeds[:count], speeds[count:]
     if xp is np:
         # only a few lengths, because each is compiled
         size = _FEWEST
@@ -178,6 +196,14 @@ def _speeds(xp: ModuleType, system, times, sides, which):
     speeds = _normal_velocities(system, times, states, which)
     speeds = xp.asarray(speeds)
     return speeds[:count], speeds[count : 2 * count]
+
+
+def _velocity_at(system, point):
+    t, x, which = point
+    return normal_velocity(system, t, x)[which]
+
+
+_VELOCITIES = Rowwise(_velocity_at)
 
 
 @eqx.filter_jit

@@ -1,12 +1,18 @@
 """Sample the state between points by one additional step of the same method."""
 
+import contextlib
+from types import ModuleType
+from typing import Any, NamedTuple
+
 import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._prepared import prepared
 from .._settings import Settings
+from ..backend import Lacking, Rowwise
 from ..breakpoints import between
 from ..loop import Functions
 from ..runge_kutta import step, tableau_of
@@ -35,40 +41,93 @@ def padded(steps: Steps) -> Steps:
     )
 
 
+class _Point(NamedTuple):
+    """The last integration point before a sample."""
+
+    # time of the sample, of the point and of the next one
+    time: Any
+    start: Any
+    end: Any
+    state: Any
+    contact: Any
+    # sides of the switching surfaces, empty without any
+    sides: Any
+
+
+class _Run(NamedTuple):
+    """A run that is sampled."""
+
+    # prepared
+    system: Any
+    settings: Settings
+    # times of the first and the last point
+    first: Any
+    last: Any
+    # distance that each component moves
+    scale: Any
+
+
+def _sampled(run: _Run, point: _Point):
+    """Return the state at one time; NaN beyond the interval of the run."""
+    system, settings, first, last, scale = run
+    n = point.state.shape[0]
+    functions = Functions(system, n, settings.plain)
+    x = tuple(point.state[i] for i in range(n))
+    mode = tuple(point.contact[i] for i in range(functions.m))
+    sides = [point.sides[i] for i in range(functions.k)]
+    mode = mode + tuple(s < 0 for s in sides) + tuple(s == 0 for s in sides)
+
+    def inside(s):
+        # no step extends across a breakpoint, so no sample of a step does
+        if system.breakpoints is None:
+            return s
+        return between(s, point.start, point.end, last - first)
+
+    place = point.start, x, mode, point.time - point.start
+    moved = advance(system, functions, settings, scale, *place, inside)
+    room = 1e-12 * jnp.maximum(jnp.abs(first), jnp.abs(last))
+    covered = (point.time >= first - room) & (point.time <= last + room)
+    return jnp.where(covered, jnp.stack(moved), jnp.nan)
+
+
+_BY_LLVM = Rowwise(_sampled)
+
+
+def _run_of(system, settings: Settings, steps: Steps, xp: ModuleType) -> _Run:
+    last = steps.time[steps.count - 1]
+    away = xp.abs(steps.state - steps.state[:1])
+    moved = xp.max(away, axis=0, initial=0.0, where=xp.isfinite(steps.state))
+    scale = xp.where(moved > 0, moved, 1.0)
+    return _Run(system, settings, steps.time[0], last, scale)
+
+
+def _points_of(steps: Steps, times, xp: ModuleType) -> _Point:
+    last = xp.asarray(steps.count, dtype=xp.int64) - 1
+    found = xp.searchsorted(steps.time, times, side="right").astype(xp.int64) - 1
+    k = xp.clip(found, 0, last)
+    sides = xp.zeros((*times.shape, 0)) if steps.sides is None else steps.sides[k]
+    end = steps.time[xp.minimum(k + 1, last)]
+    return _Point(times, steps.time[k], end, steps.state[k], steps.contact[k], sides)
+
+
 @eqx.filter_jit
 def sample(system, settings: Settings, steps: Steps, times):
-    system = system.prepared()
-    n = steps.state.shape[1]
-    functions = Functions(system, n, settings.plain)
-    last = steps.time[steps.count - 1]
-    moved = jnp.max(jnp.abs(steps.state - steps.state[:1]), axis=0, initial=0.0,
-                    where=jnp.isfinite(steps.state))  # fmt: skip
-    scale = jnp.where(moved > 0, moved, 1.0)
+    """Return the states at some times, `(times, n)`, in a program of XLA."""
+    run = _run_of(system.prepared(), settings, steps, jnp)
+    points = _points_of(steps, times, jnp)
+    return jax.vmap(lambda point: _sampled(run, point))(points)
 
-    def one(t):
-        found = jnp.searchsorted(steps.time, t, side="right").astype(jnp.int64) - 1
-        k = jnp.clip(found, 0, steps.count.astype(jnp.int64) - 1)
-        x = tuple(steps.state[k, i] for i in range(n))
-        mode = tuple(steps.contact[k, i] for i in range(functions.m))
-        if steps.sides is not None:
-            sides = [steps.sides[k, i] for i in range(functions.k)]
-            mode = mode + tuple(s < 0 for s in sides) + tuple(s == 0 for s in sides)
-        start = steps.time[k]
-        end = steps.time[jnp.minimum(k + 1, steps.count.astype(jnp.int64) - 1)]
-        span = last - steps.time[0]
 
-        def inside(s):
-            # no step extends across a breakpoint, so no sample of a step does
-            return s if system.breakpoints is None else between(s, start, end, span)
-
-        point = start, x, mode, t - start
-        moved = advance(system, functions, settings, scale, *point, inside)
-        # NaN beyond the interval of the run
-        room = 1e-12 * jnp.maximum(jnp.abs(steps.time[0]), jnp.abs(last))
-        covered = (t >= steps.time[0] - room) & (t <= last + room)
-        return jnp.where(covered, jnp.stack(moved), jnp.nan)
-
-    return jax.vmap(one)(times)
+def sample_known(system, settings: Settings, steps: Steps, times) -> np.ndarray:
+    """Return the states at some times, `(times, n)`, of a run that is not traced."""
+    implicit = isinstance(settings.solver, diffrax.AbstractImplicitSolver)
+    if settings.compiles and not implicit and times.size:
+        known = jax.tree.map(np.asarray, steps)
+        run = _run_of(prepared(system), settings, known, np)
+        with contextlib.suppress(Lacking):
+            return _BY_LLVM(run, _points_of(known, times, np), len(times))
+    found = sample(system, settings, padded(steps), pad(times, np.nan))
+    return np.asarray(found)[: len(times)].copy()
 
 
 def advance(

@@ -14,7 +14,7 @@ from ..codes import message
 from ..surface import gaps
 from ._events import Contacts, Impacts, Steps, Switches
 from ._printed import Printed
-from ._sample import pad, padded, sample
+from ._sample import pad, sample, sample_known
 from ._section import crossings
 
 
@@ -117,9 +117,8 @@ class Trajectory(Printed):
                 )
         if not known:
             return sample(self.system, self.settings, self.steps, times)
-        steps, longer = padded(self.steps), pad(times, np.nan)
-        found = sample(self.system, self.settings, steps, longer)
-        return jax.device_put(np.asarray(found)[: times.shape[0]].copy())
+        found = sample_known(self.system, self.settings, self.steps, times)
+        return jax.device_put(found)
 
     def gap(self, times):
         """Return the gap at each of `times`.

@@ -41,11 +41,6 @@ _BATCH = 64
 FRACTIONS = np.arange(1, 9) / 8
 
 
-@eqx.filter_jit
-def prepared(system):
-    return system.prepared()
-
-
 def _compiled(method):
     """Compile a function only once: numbers become arrays, which are not part of the
     program.

@@ -16,12 +16,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import breakpoints
+from .._prepared import prepared
 from ..codes import FINISHED, NOT_FINITE, RowKind, RUNNING, STEP_FAILED, TOGETHER
 from ..loop import Log
 from ..surface import may_hit_together
 from ._end_of_chatter import end_of_chatter, Rebound, Rest
 from ._events import Flown, TOO_LONG
-from ._motion import CompiledMotion, prepared
+from ._motion import CompiledMotion
 
 
 # a flight with lambda = v |j| / a^2 below this is one step instead of a diffrax call

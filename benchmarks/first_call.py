@@ -1,0 +1,89 @@
+"""Measure the first simulation in a process, with each compiler.
+
+Every measurement runs in a process of its own: first with an empty folder for compiled
+programs, then with the folder that the first one filled. The script prints the CPU time
+in seconds of the first `simulate` (20 periods or 20 s), of the first `trajectory.at`,
+and of the same two calls in the second process. Importing jax and jaxcam is not
+included.
+
+    python -m benchmarks.first_call
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+import jax.numpy as jnp
+import numpy as np
+
+import jaxcam
+from jaxcam import models
+from jaxcam.hybrid import Settings
+
+
+SYSTEMS = {
+    "CamFollower": lambda: (models.CamFollower(), [0.35, 0.0], 8.0),
+    "ImpactOscillator": lambda: (
+        models.ImpactOscillator(omega=2.8, restitution=0.8),
+        [-0.5, 0.0],
+        20.0,
+    ),
+    "TwoSidedStop": lambda: (models.TwoSidedStop(), [0.0, 0.1], 20.0),
+    "BeltOscillator": lambda: (models.BeltOscillator(), [1.0, 0.0], 20.0),
+    "RockingBlock": lambda: (models.RockingBlock(), [0.1, 0.1, 0.0, 0.0], 4.0),
+    "SpinningBall": lambda: (
+        models.SpinningBall(),
+        [0.0, 1.0, 0.0, 1.0, 0.0, 3.0],
+        3.0,
+    ),
+}
+
+
+def measured(name: str, backend: str) -> tuple[float, float]:
+    """CPU seconds of the first simulation, and of the first samples."""
+    system, state, end = SYSTEMS[name]()
+    settings = Settings(backend=backend)  # pyright: ignore
+    begun = time.process_time()
+    run = jaxcam.simulate(system, jnp.asarray(state), 0.0, end, settings=settings)
+    simulated = time.process_time()
+    run.at(np.linspace(0.0, end, 200))
+    assert run.successful, run.result
+    return simulated - begun, time.process_time() - simulated
+
+
+def in_process(name: str, backend: str, folder: str) -> tuple[float, float]:
+    """The same in a process of its own, which keeps its programs in a folder."""
+    more = {
+        "JAX_COMPILATION_CACHE_DIR": folder,
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+    }
+    command = [sys.executable, "-m", "benchmarks.first_call", "--one", name, backend]
+    done = subprocess.run(
+        command, env=os.environ | more, capture_output=True, text=True, check=True
+    )
+    return tuple(json.loads(done.stdout.splitlines()[-1]))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--one", nargs=2, metavar=("SYSTEM", "BACKEND"))
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(measured(*options.one)))
+        return
+    print("| system | backend | first simulate, at (s) | in a second process (s) |")
+    print("| --- | --- | --- | --- |")
+    for name in SYSTEMS:
+        for backend in ("xla", "llvm"):
+            with tempfile.TemporaryDirectory() as folder:
+                times = [in_process(name, backend, folder) for _ in range(2)]
+            cold, warm = (f"{a:.2f}, {b:.2f}" for a, b in times)
+            print(f"| {name} | {backend} | {cold} | {warm} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
