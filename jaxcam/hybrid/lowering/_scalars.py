@@ -5,9 +5,11 @@ it traced, which takes far longer than storing it: programs of arrays compute ma
 elements that nothing depends on.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any, no_type_check
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import Primitive
@@ -119,7 +121,17 @@ def forced(element, memory: Memory):
 def _applied(operation: Callable, params, values):
     if not isinstance(operation, Primitive):
         return operation(*values)
-    return operation.bind(*map(jnp.asarray, values), **params)
+    given = _defaults(operation.name) | params
+    return operation.bind(*map(jnp.asarray, values), **given)
+
+
+@functools.cache
+def _defaults(name: str) -> dict:
+    """Return parameters that a primitive has whenever JAX applies it."""
+    if name != "mul":
+        return {}
+    # reverse mode fails without them
+    return jax.make_jaxpr(jax.lax.mul)(1.0, 1.0).eqns[0].params
 
 
 @no_type_check
