@@ -30,3 +30,12 @@ def test_only_a_rule_that_saves_work_is_taken_apart(rule, opened):
     assert ("custom_jvp_call" not in names) == opened
     np.testing.assert_allclose(called(x), x**2, rtol=1e-15)
     np.testing.assert_allclose(jax.jacfwd(called)(x), np.diag(2 * x), rtol=1e-15)
+
+
+def test_reverse_mode_of_products():
+    """The gradient of (x . M x) by reverse mode; JAX rejected the products."""
+    matrix = jnp.array([[2.0, 1.0], [0.5, 3.0]])
+    scalar = scalarise(lambda x: x @ matrix @ x, jax.ShapeDtypeStruct((2,), float))
+    x = jnp.array([0.3, -1.2])
+    found = jax.grad(lambda x: scalar(split(x))[()])(x)
+    np.testing.assert_allclose(found, (matrix + matrix.T) @ x, rtol=1e-14)

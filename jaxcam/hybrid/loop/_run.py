@@ -165,8 +165,6 @@ def run_reversible(
     block = max(1, int(rows**0.5))
     blocks = -(-rows // block)
 
-    # recomputed as well: thousands of stored values would take minutes to compile
-    @jax.checkpoint
     def one(carried, _):
         carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(_row(record, carried))
