@@ -25,6 +25,8 @@ class Monitor(eqx.Module):
     """Whether the zero is bracketed by points of the branch instead of computed by
     Newton's method; for monitors whose derivative is costly to compile.
     """
+    corner: bool = eqx.field(static=True, default=False)
+    """Whether the branch may have a corner at the zero, where it turns abruptly."""
     vanishing: tuple[str, ...] = eqx.field(static=True, default=())
     """Names of monitors that are also zero whenever this one is, and are then
     ignored.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._context import Context
-from ._point import with_field
+from ._point import with_field, with_parameter
 from ._program import evaluate
 from ._solution import Solution
 from .special import (
@@ -27,6 +27,15 @@ class Special(NamedTuple):
     criticality: str
 
 
+# distance of the points on both sides of a special point, relative to the step
+_BESIDE = 1e-3
+
+
+def _unknowns(problem, context: Context, z: np.ndarray):
+    """Return the unknowns and the parameters of a point."""
+    return z[:-1], with_parameter(problem, context.leaf, z[-1]).parameters
+
+
 def sign_changes(context: Context, current: Solution, following: Solution) -> list[str]:
     """Return the names of the test functions that change sign in the step."""
     if not context.settings.special:
@@ -39,7 +48,21 @@ def sign_changes(context: Context, current: Solution, following: Solution) -> li
         before = current.tests.get(name, 0.0)
         if name in watched and before * after < 0:
             found.append(name)
-    return sorted(found, key=lambda name: name != BRANCH_POINT)
+    # test functions that are not continuous at a corner change sign there as well
+    first = {BRANCH_POINT, *corners(current, following)}
+    return sorted(found, key=lambda name: name not in first)
+
+
+def corners(current: Solution, following: Solution) -> list[str]:
+    """Return the names of monitors that change sign in the step and may do so at a
+    corner.
+    """
+    return [
+        name
+        for name, monitor in current.problem.monitors().items()
+        if monitor.corner
+        and current.tests.get(name, 0.0) * following.tests.get(name, 0.0) < 0
+    ]
 
 
 def located_between(
@@ -75,7 +98,7 @@ def located_between(
 def special_here(
     context: Context, current: Solution, chord: np.ndarray, name: str, located: Located
 ) -> Special | None:
-    """Return the special point as a state of the run; None for a neutral saddle.
+    """Return the special point as a state of the run; None if it is not reported.
 
     `chord` points along the branch there.
     """
@@ -83,8 +106,16 @@ def special_here(
     at = evaluate(problem, context, located.z, chord)
     if not np.all(np.isfinite(at.tangent)) or name == BRANCH_POINT:
         at = with_field(at, "tangent", chord / np.linalg.norm(chord / at.scale))
-    monitors = problem.monitors()
-    kind = monitors[name].kind if name in monitors else name
+    monitors, kind = problem.monitors(), name
+    if name in monitors:
+        sides = [
+            _unknowns(problem, context, located.z + share * chord)
+            for share in (-_BESIDE, _BESIDE)
+        ]
+        found = problem.kind_of_zero(name, *sides)
+        if found is None:
+            return None
+        kind = found
     if located.converged and name not in monitors:
         if not pair_is_complex(problem, kind, context, located.z, at):
             return None

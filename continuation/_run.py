@@ -9,17 +9,19 @@ from ._begin import leave, solved_start
 from ._closed import closed, Past
 from ._context import Context
 from ._parameter import as_arguments, leaf_of
-from ._passed import located_between, sign_changes, special_here
+from ._passed import corners, located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
 from ._program import Corrected, evaluate
 from ._solution import point_of, Solution, solution_at
-from ._step import attempt_step
+from ._step import attempt_step, StepAttempt
 from .predictors import Station
 from .problem import AbstractProblem
 from .special import ahead, BRANCH_POINT, Located
 from .step_control import Refusal
 
 
+# longest step around a corner of the branch, relative to the initial one
+_CORNER = 1e-2
 # number of failures in one place before an end is searched for just ahead
 _HALVINGS = 2
 # an orbit has half the period if its halves differ by less than this, in step lengths;
@@ -155,6 +157,7 @@ class Run:
                 step,
                 self.name,
             )
+            attempted = self._around_corner(current, attempted, step)
             refusal = attempted.refusal
             if attempted.at is not None:
                 following = self._moved(current, attempted.at, attempted.following)
@@ -184,6 +187,18 @@ class Run:
             if last:
                 return None, (f"the step was halved down to {step:.1e}, but {refusal}")
             step /= 2
+
+    def _around_corner(
+        self, current: Solution, attempted: StepAttempt, step: float
+    ) -> StepAttempt:
+        """Accept a step that turns abruptly if it is short and passes a corner."""
+        usual = self.context.settings.step
+        if attempted.solution is None or step > _CORNER * usual:
+            return attempted
+        following = self._moved(current, attempted.solution, _CORNER * usual)
+        if not corners(current, following):
+            return attempted
+        return StepAttempt(attempted.solution, attempted.bound, _CORNER * usual)
 
     def _stations(self, current: Solution) -> list[Station]:
         """Return the last points, scaled as at the current point."""
@@ -266,7 +281,7 @@ class Run:
     def _special(
         self, current: Solution, chord, name: str, located: Located
     ) -> tuple[Point, Solution] | None:
-        """Return the special point and its solution; None for a neutral saddle."""
+        """Return the special point and its solution; None if it is not reported."""
         special = special_here(self.context, current, chord, name, located)
         if special is None:
             return None

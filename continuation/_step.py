@@ -26,6 +26,9 @@ class StepAttempt(NamedTuple):
     """Length of the next step."""
     refusal: Refusal | None = None
     """Reason for rejecting the step."""
+    solution: Corrected | None = None
+    """The solution, if the step is rejected only because it is far or in another
+    direction."""
 
 
 def attempt_step(
@@ -82,7 +85,7 @@ def _judged(
     control, settings = algorithm.control, context.settings
     for reason, holds in control.refusals(measures, step, settings).items():
         if holds:
-            return StepAttempt(None, refusal=reason)
+            return StepAttempt(None, bound, refusal=reason, solution=b)
     return StepAttempt(b, bound, float(control.next_step(measures, step, settings)))
 
 

@@ -72,8 +72,8 @@ class AbstractProblem(eqx.Module):
     smooth; where an orbit does not exist, return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
-    `check`, `transition`, `refreshed`, `eigenvalues`, `representation`, `signature`,
-    `with_signature`. They may compile their own programs.
+    `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,
+    `signature`, `with_signature`. They may compile their own programs.
 
     **Order of calls** for a step from point a to point b: first the corrector, then
     `derivatives` and `seen` at b in the same program. If a monitor with `ends` has
@@ -235,6 +235,25 @@ class AbstractProblem(eqx.Module):
         return jnp.stack([values[name] for name in self.monitors()])[number]
 
     # -- between compiled programs
+
+    def kind_of_zero(
+        self, name: str, before: tuple[Any, PyTree], after: tuple[Any, PyTree]
+    ) -> str | None:
+        """Return the kind of the special point at a zero of a monitor, or None if it is
+        not to be reported.
+
+        By default, it is the `kind` of the monitor.
+
+        Args:
+            name: Name of the monitor.
+            before: Unknowns and parameters just before the point.
+            after: Unknowns and parameters just behind it.
+
+        Returns:
+            A kind, or None.
+        """
+        del before, after
+        return self.monitors()[name].kind
 
     def check(self, point: Any) -> str | None:
         """Return None if the point is admissible, otherwise the reason as text.

@@ -13,8 +13,14 @@ from jaxcam.hybrid import flow, HybridSystem, Settings
 from jaxcam.hybrid.sizes import component_sizes
 from variational import Orbit
 
-from ..problem import AbstractProblem, StabilityKind, Start
+from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ..special import FLIP, flip_direction
+from ._event_changes import (
+    events_of,
+    monitors_of_events,
+    name_of_change,
+    values_of_events,
+)
 
 
 # part of a period over which the direction of the motion is taken
@@ -30,6 +36,10 @@ class SingleShooting(AbstractProblem):
     lie in a plane perpendicular to the motion, which is updated at each point of a
     branch. One compiled program computes orbits with any number of impacts, crossings
     and sliding phases. The Jacobian contains the saltation matrices of all events.
+    Points at which the sequence of events changes are located and named: `"grazing"`,
+    `"grazing-sliding"`, `"crossing-sliding"`, `"switching-sliding"`, `"adding-sliding"`
+    or `"change of events"`. If it changes twice in one step, the second change may be
+    missed.
 
     Where an impact grazes, the Jacobian is unbounded on one side; follow orbits of
     systems without switching surfaces with [`continuation.ImpactingOrbits`][], which
@@ -159,9 +169,9 @@ class SingleShooting(AbstractProblem):
         return jnp.where(sizes > 0, sizes, 1.0)
 
     def seen(self, u, parameters):
-        """Return the observed quantities; there are no monitors.
+        """Return the monitors of the numbers of events, and the observed quantities.
 
-        They are the period (s), the time (s) and the state at the start of
+        The latter are the period (s), the time (s) and the state at the start of
         the period, the number of impacts and, with forcing, the states at whole forcing
         periods after that time, `(periods, n)`.
 
@@ -181,7 +191,20 @@ class SingleShooting(AbstractProblem):
         }
         if self.periods:
             found["stroboscopic"] = self._stroboscopic(x, start, end, parameters)
-        return {}, found
+        return values_of_events(arrival), found
+
+    def monitors(self) -> dict[str, Monitor]:
+        return monitors_of_events()
+
+    def kind_of_zero(self, name: str, before, after) -> str | None:
+        del name
+
+        def events(u, parameters):
+            u = jnp.asarray(u)
+            times = self.times(u, parameters)
+            return events_of(parameters, self.state(u), *times, self.settings)
+
+        return name_of_change(events(*before), events(*after))
 
     def _stroboscopic(self, x, start, end, parameters):
         if self.periods == 1:

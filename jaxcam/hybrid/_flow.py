@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..parameters import as_arrays, real_array, VectorLike
+from ._event_counts import EventCounts
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
@@ -36,6 +37,11 @@ class Arrival(eqx.Module):
     """Number of attempted integration steps."""
     code: Int[Array, ""]
     """Index into `RESULTS`; 0 if the run reached the end."""
+    events: EventCounts
+    """Numbers of events on the way."""
+    start: Bool[Array, " flags"]
+    """Mode at the start, shape `(m + 2 k,)`: constraints in contact, then surfaces on
+    whose negative side the motion starts, then surfaces along which it slides."""
 
 
 def flow(
@@ -97,14 +103,19 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     x = tuple(state[i] for i in range(state.shape[0]))
     carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
     carried = jax.tree.map(jnp.asarray, carried)
-    body, kept = with_kept(
-        lambda carried: (iteration(functions, plan, carried)[0], jnp.zeros(())),
-        carried,
-        on=not settings.plain,
-    )
+    start = jnp.stack(carried.mode) if carried.mode else jnp.zeros(0, bool)
+
+    def attempt(both):
+        carried, events = both
+        carried, record = iteration(functions, plan, carried)
+        kind = jax.lax.stop_gradient(jnp.asarray(record.kind, jnp.float64))
+        return (carried, events.after(kind)), jnp.zeros(())
+
+    first = carried, EventCounts.zero()
+    body, kept = with_kept(attempt, first, on=not settings.plain)
 
     def unfinished(carry):
-        count, (carried, _) = carry
+        count, ((carried, _), _) = carry
         return (count < max_steps) & eqxi.unvmap_any(carried.status == RUNNING)
 
     def several(carry):
@@ -112,13 +123,15 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
         carried, _ = jax.lax.scan(lambda s, _: body(s), carried, None, length=_BLOCK)
         return count + _BLOCK, carried
 
-    start = (jnp.asarray(0, jnp.int32), (carried, kept))
+    begin = (jnp.asarray(0, jnp.int32), (first, kept))
     loop = functools.partial(jax.lax.while_loop, unfinished, several)
-    _, (carried, kept) = one_kernel(loop, on=not settings.plain)(start)
+    _, ((carried, events), kept) = one_kernel(loop, on=not settings.plain)(begin)
     return Arrival(
         state=jnp.stack(carried.x),
         contact=jnp.stack(carried.contact) if functions.m else jnp.zeros(0, bool),
         impacts=carried.impacts,
         steps=depend_on(carried.steps, kept),
         code=carried.status.astype(jnp.int32),
+        events=events,
+        start=start,
     )

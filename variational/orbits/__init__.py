@@ -34,7 +34,12 @@ from ._monodromy import (
 )
 from ._multipliers import eigenvalues as eigenvalues
 from ._one_impact import one_impact_orbits as one_impact_orbits
-from ._orbit import Event as Event, Orbit as Orbit, orbit_of as orbit_of
+from ._orbit import (
+    Event as Event,
+    events_in_time as events_in_time,
+    Orbit as Orbit,
+    orbit_of as orbit_of,
+)
 from ._seeds import seed as seed, steps_for as steps_for
 from ._shooting import Seen as Seen, Shooting as Shooting
 from ._special_points import (

@@ -277,6 +277,15 @@ def signature_of(
     """Return impacts, starts of contact, releases and switches as one sequence in
     time.
     """
+    return tuple(event for _, event in events_in_time(impacts, contacts, switches))
+
+
+def events_in_time(
+    impacts: Impacts, contacts: Contacts, switches: Switches | None = None
+) -> list[tuple[float, Event]]:
+    """Return impacts, starts of contact, releases and switches with their times (s), in
+    order.
+    """
     found = []
     for k in range(int(impacts.count)):
         found.append((float(impacts.time[k]), 0, "impact", int(impacts.constraint[k])))
@@ -285,9 +294,8 @@ def signature_of(
         found.append((float(contacts.start[k]), 1, "stick", which))
         if bool(contacts.released[k]):
             found.append((float(contacts.end[k]), 2, "release", which))
-    if switches is None:
-        return tuple(Event(kind, which) for _, _, kind, which in sorted(found))
-    for k in range(int(switches.count)):
+    for k in range(0 if switches is None else int(switches.count)):
+        assert switches is not None
         kind, which = _AT_SURFACE[int(switches.kind[k])], int(switches.surface[k])
         found.append((float(switches.time[k]), 3, kind, which))
-    return tuple(Event(kind, which) for _, _, kind, which in sorted(found))
+    return [(time, Event(kind, which)) for time, _, kind, which in sorted(found)]

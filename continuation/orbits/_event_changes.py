@@ -1,0 +1,122 @@
+"""Detect changes of the sequence of events along a branch, and name them."""
+
+from collections import Counter
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxcam.hybrid import HybridSystem, Settings, simulate
+from variational.orbits import Event, events_in_time
+
+from ..problem import Monitor
+
+
+CHANGE = "change of events"
+"""Kind of a change that has no name of its own."""
+
+_MODE = ("contacts", "sides", "sliding")
+_COUNTED = ("impacts", "contacts", "crossings", "slides")
+
+
+def monitors_of_events() -> dict[str, Monitor]:
+    """Return two monitors for each number of events, and one for each part of the mode.
+
+    The first changes sign if one event is added or removed, the second if two are. The
+    mode at the start changes where an event passes through the start of the period.
+    """
+    names = [name for one in _COUNTED for name in (one, f"pairs of {one}")]
+    names += [f"{part} at the start" for part in _MODE]
+    return {name: Monitor(CHANGE, bracket=True, corner=True) for name in names}
+
+
+def values_of_events(arrival: Any) -> dict[str, Float[Array, ""]]:
+    """Return the monitors for the `Arrival` of an orbit: +1 or -1."""
+    found = {}
+    m = arrival.contact.shape[0]
+    k = (arrival.start.shape[0] - m) // 2
+    for part, flags in zip(_MODE, jnp.split(arrival.start, [m, m + k]), strict=True):
+        found[f"{part} at the start"] = jnp.prod(jnp.where(flags, -1.0, 1.0))
+    for name in _COUNTED:
+        number = getattr(arrival.events, name)
+        found[name] = 1.0 - 2.0 * jnp.mod(number, 2.0)
+        found[f"pairs of {name}"] = 1.0 - 2.0 * jnp.mod(jnp.floor(number / 2), 2.0)
+    return found
+
+
+def events_of(
+    system: HybridSystem, state, start, end, settings: Settings
+) -> list[tuple[float, Event]]:
+    """Return the events of one period of a motion with their times (s); none if it
+    fails.
+
+    The period begins in the longest interval without events, so that an event at
+    `start` occurs once.
+    """
+    start, end = float(start), float(end)
+    run = simulate(system, state, start, 2 * end - start, settings=settings)
+    if not run.successful:
+        return []
+    found = events_in_time(run.impacts, run.contacts, run.switches)
+    times = np.array([time for time, _ in found if time <= end] + [end])
+    longest = int(np.argmax(np.diff(times, prepend=start)))
+    begin = times[longest] - np.diff(times, prepend=start)[longest] / 2
+    return [one for one in found if begin <= one[0] < begin + end - start]
+
+
+def name_of_change(
+    before: list[tuple[float, Event]], after: list[tuple[float, Event]]
+) -> str | None:
+    """Return the name of the bifurcation between two sequences of events, or None if
+    they are the same orbit seen from another phase.
+
+    - `"grazing"`: the orbit touches a constraint or a switching surface, which adds an
+      impact or two crossings.
+    - `"grazing-sliding"`: it touches a surface, and slides there.
+    - `"crossing-sliding"`: it slides where it crossed.
+    - `"switching-sliding"`: it crosses a surface before it slides there.
+    - `"adding-sliding"`: it leaves the surface for a moment during sliding.
+
+    (M. di Bernardo, P. Kowalczyk, A. Nordmark, Bifurcations of dynamical systems with
+    sliding, Physica D 170 (2002))
+    """
+    first, second = ([event for _, event in part] for part in (before, after))
+    if _rotated(first, second):
+        return None
+    # the longer sequence is that of the orbit with the additional events
+    if len(first) > len(second):
+        before, after = after, before
+        first, second = second, first
+    added = Counter(event.kind for event in second)
+    added.subtract(event.kind for event in first)
+    change = {kind: number for kind, number in added.items() if number}
+    if change in ({"impact": 1}, {"cross": 2}):
+        return "grazing"
+    if change == {"cross": 1}:
+        return "switching-sliding"
+    if change == {"slide": 1, "leave": 1, "cross": -1}:
+        return "crossing-sliding"
+    if change == {"slide": 1, "leave": 1}:
+        return "grazing-sliding" if _briefest(after) == "slide" else "adding-sliding"
+    return CHANGE
+
+
+def _rotated(first: list[Event], second: list[Event]) -> bool:
+    """Return whether two sequences differ only by their first event."""
+    if len(first) != len(second):
+        return False
+    turns = range(max(1, len(first)))
+    return any(first[k:] + first[:k] == second for k in turns)
+
+
+def _briefest(events: list[tuple[float, Event]]) -> str:
+    """Return which of `"slide"` and `"leave"` begins the shortest interval between the
+    two.
+    """
+    pairs = [
+        (later - time, event.kind)
+        for (time, event), (later, other) in zip(events[:-1], events[1:], strict=True)
+        if {event.kind, other.kind} == {"slide", "leave"}
+    ]
+    return min(pairs, default=(0.0, "slide"))[1]

@@ -1,0 +1,47 @@
+"""Count the events of a motion, for programs that do not list them."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .codes import RowKind
+
+
+class EventCounts(eqx.Module):
+    """Numbers of events of a motion, floats.
+
+    The impacts of a complete chatter sequence count as one contact.
+    """
+
+    impacts: Float[Array, ""]
+    """Number of impacts outside of complete chatter sequences."""
+    contacts: Float[Array, ""]
+    """Number of complete chatter sequences."""
+    crossings: Float[Array, ""]
+    """Number of crossings of switching surfaces."""
+    slides: Float[Array, ""]
+    """Number of times that sliding begins."""
+    recent: Float[Array, ""]
+    """Number of impacts since the last other event."""
+
+    @staticmethod
+    def zero() -> "EventCounts":
+        """Return the numbers at the start."""
+        return EventCounts(*(jnp.zeros(()) for _ in range(5)))
+
+    def after(self, kind: Float[Array, ""]) -> "EventCounts":
+        """Return the numbers after an attempt with this `RowKind`."""
+
+        def one_if(which: RowKind):
+            return jnp.where(kind == float(which), 1.0, 0.0)
+
+        hits, completes = one_if(RowKind.IMPACT), one_if(RowKind.LAST_IMPACT)
+        quiet = (kind <= float(RowKind.STEP)) | (kind == float(RowKind.STOP))
+        recent = jnp.where(quiet, self.recent, 0.0)
+        return EventCounts(
+            impacts=self.impacts + hits - completes * self.recent,
+            contacts=self.contacts + completes,
+            crossings=self.crossings + one_if(RowKind.SWITCH),
+            slides=self.slides + one_if(RowKind.SLIDE),
+            recent=jnp.where(hits > 0, self.recent + 1.0, recent),
+        )

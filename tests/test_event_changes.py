@@ -1,0 +1,107 @@
+"""Branches through changes of the sequence of events, located and named."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import continuation
+import jaxcam
+from continuation.orbits._event_changes import events_of, name_of_change
+from jaxcam.hybrid import flow, Settings
+from jaxcam.models import BeltOscillator, BouncingBall
+from variational.orbits import Event
+
+
+BELT = BeltOscillator(
+    belt=1.3, friction=0.4, weakening=0.0, damping=0.05, amplitude=0.9, omega=0.7
+)
+
+
+def grazing_belt() -> float:
+    """Belt speed equal to the largest speed of the harmonic motion without sticking."""
+    return 0.9 * 0.7 / np.hypot(1 - 0.7**2, 2 * 0.05 * 0.7)
+
+
+def test_a_branch_through_grazing_and_switching_sliding():
+    """The belt oscillator: grazing-sliding to 1e-9; then the crossing begins."""
+    orbit = continuation.periodic_orbit(BELT, [0.0, 0.0], periods=1)
+    found = continuation.branch(BELT, orbit, "belt", (1.0, 1.35), direction=-1)
+    assert [p.kind for p in found.special] == ["grazing-sliding", "switching-sliding"]
+    assert all(p.converged for p in found.special)
+    first, second = (p.parameter for p in found.special)
+    assert first == pytest.approx(grazing_belt(), abs=1e-9)
+    # bisection by simulation: the figure 2.14 of jaxcam.thesis
+    assert second == pytest.approx(1.036157193, abs=1e-8)
+    assert found.points[-1].parameter == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_a_branch_to_the_crossing_without_sliding():
+    """Down to a slow belt; events pass through the start of the period on the way."""
+    orbit = continuation.periodic_orbit(BELT, [0.0, 0.0], periods=1)
+    found = continuation.branch(BELT, orbit, "belt", (0.1, 1.35), direction=-1)
+    kinds = ["grazing-sliding", "switching-sliding", "crossing-sliding"]
+    assert [p.kind for p in found.special] == kinds
+    assert found.special[2].parameter == pytest.approx(0.413160730, abs=1e-8)
+    assert found.points[-1].parameter == pytest.approx(0.1)
+
+
+def test_the_events_of_a_period_do_not_depend_on_its_start():
+    """A slide that begins just before or just behind the start is one slide."""
+    settings = Settings(tolerance=1e-11)
+    period = float(BELT.period)
+    seen = []
+    for belt in (0.47785, 0.47805):
+        system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(belt))
+        state = jaxcam.simulate(system, [0.0, 0.0], 0.0, 60 * period).final
+        seen.append(events_of(system, state, 0.0, period, settings))
+    assert [len(one) for one in seen] == [3, 3]
+    assert name_of_change(*seen) is None
+
+
+def _sequence(*kinds):
+    """Events a second apart; a number is the time since the last one."""
+    time, found = 0.0, []
+    for kind in kinds:
+        if isinstance(kind, float):
+            time += kind - 1.0
+        else:
+            time += 1.0
+            found.append((time, Event(kind, 0)))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "name"),
+    [
+        (["impact"], ["impact", "impact"], "grazing"),
+        (["cross", "cross"], [], "grazing"),
+        ([], ["slide", 0.1, "leave"], "grazing-sliding"),
+        (["slide", "leave"], ["cross", "slide", "leave"], "switching-sliding"),
+        (["cross", "cross"], ["cross", "slide", 0.1, "leave"], "crossing-sliding"),
+        (
+            ["slide", "leave"],
+            ["slide", "leave", 0.1, "slide", "leave"],
+            "adding-sliding",
+        ),
+        (["cross", "slide", "leave"], ["slide", "leave", "cross"], None),
+        (["impact"], ["stick", "release"], "change of events"),
+    ],
+)
+def test_names_of_changes(before, after, name):
+    """In both directions."""
+    first, second = _sequence(*before), _sequence(*after)
+    assert name_of_change(first, second) == name
+    assert name_of_change(second, first) == name
+
+
+def test_the_impacts_of_complete_chatter_are_one_event():
+    """Of a ball that bounces, rests, and has bounced once before a breakpoint."""
+    ball = BouncingBall(gravity=9.81, restitution=0.5)
+    run = flow(ball, jnp.array([1.0, 0.0]), 0.0, 3.0)
+    assert float(run.events.contacts) == 1.0
+    assert float(run.events.impacts) == 0.0
+    assert float(run.impacts) > 3.0
+    early = flow(ball, jnp.array([1.0, 0.0]), 0.0, 1.0)
+    assert (float(early.events.impacts), float(early.events.contacts)) == (2.0, 0.0)
