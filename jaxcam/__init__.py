@@ -14,6 +14,7 @@ _jax.config.update("jax_enable_x64", True)
 
 from ._citation import citation as citation
 from .hybrid import (
+    clear_caches as clear_caches,
     HybridSystem as HybridSystem,
     Settings as Settings,
     simulate as simulate,

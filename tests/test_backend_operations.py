@@ -360,3 +360,12 @@ def test_what_is_lacking_is_named():
         Mapped(lambda _, x: [jnp.linalg.det(jnp.outer(x, x))], 0, 5)
     with pytest.raises(Lacking, match="sort"):
         Mapped(lambda _, x: [jnp.sort(x)[0]], 0, 3)
+
+
+def test_a_function_that_prints_is_left_to_xla():
+    def printing(shared, own):
+        jax.debug.print("{x}", x=own[0])
+        return [own[0]]
+
+    with pytest.raises(Lacking, match="debug"):
+        Mapped(printing, 0, 1)

@@ -327,6 +327,20 @@ def test_saltation_matrices_in_closed_form():
         switching_saltation(system, 0.0, state, slides)
 
 
+def test_the_saltation_matrix_of_a_crossing_can_be_traced():
+    """State and sides, under jit and vmap."""
+    system = BeltOscillator(belt=0.3, friction=0.4, weakening=0.0)
+    states = jnp.array([[1.0, 0.3], [1.2, 0.3]])
+    sides = jnp.array([[1.0], [-1.0]])
+
+    def one(x, side):
+        return switching_saltation(system, 0.0, x, side)
+
+    found = jax.jit(jax.vmap(one))(states, sides)
+    expected = [one(x, np.asarray(s)) for x, s in zip(states, sides, strict=True)]
+    assert largest(found, jnp.stack(expected)) < 1e-15
+
+
 class Gripped(BeltOscillator):
     """Static friction exceeds kinetic friction."""
 

@@ -1,9 +1,11 @@
 """Propagate perturbations through the events at a switching surface."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxcam.hybrid import SwitchedSystem
+from jaxcam.hybrid.checks import is_traced
 from jaxcam.hybrid.surface import InMode, Jumps, OnSides, resets, switching_distances
 from jaxcam.parameters import VectorLike
 
@@ -38,7 +40,7 @@ def switching_saltation(
         t: Time of the event (s).
         state: State at the event, shape `(n,)`.
         sides: Sides of all surfaces before the event, +1 or -1, or 0 while the motion
-            slides, shape `(k,)`.
+            slides, shape `(k,)`. If they are traced, the event is a crossing.
         surface: Index of the surface of the event.
         after: Side of this surface after the event, 0 if sliding begins; default: the
             other side.
@@ -58,18 +60,21 @@ def switching_saltation(
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)
-    old = jnp.asarray(sides, dtype=jnp.float64)
-    if after is None and old[surface] == 0:
+    traced = is_traced((sides, after))
+    xp = jnp if traced else np
+    old = xp.asarray(sides, dtype=xp.float64)
+    if after is None and not traced and old[surface] == 0:
         raise ValueError(
             "the motion slides before the event; pass the side on which it continues, "
             "such as after=1.0"
         )
-    new = old.at[surface].set(-old[surface] if after is None else after)
+    here = np.arange(old.shape[0]) == surface
+    new = xp.where(here, -old if after is None else after, old)
+    slides = not traced and (old[surface] == 0 or new[surface] == 0)
     before, beyond = _in_mode(system, old, x), _in_mode(system, new, x)
-    sliding = old[surface] == 0 or new[surface] == 0
     reset_from = OnSides(system, before.negative)
     law_x, moved, normal, speed = event_crossing(
-        lambda s, y: y if sliding else resets(reset_from, s, y)[surface],
+        lambda s, y: y if slides else resets(reset_from, s, y)[surface],
         lambda s, y: switching_distances(before, s, y)[surface],
         before.vector_field,
         beyond.vector_field,
@@ -82,6 +87,9 @@ def switching_saltation(
 def _in_mode(system: SwitchedSystem, sides, x) -> InMode:
     """Return the system on these sides, sliding where a side is zero."""
     every = tuple(range(x.shape[0]))
-    changed = tuple(every if side == 0 else () for side in sides)
+    # whether it slides must be known while tracing
+    held = [not is_traced(side) and side == 0 for side in sides]
+    changed = tuple(every if slides else () for slides in held)
     flat: Bool[Array, " m"] = jnp.zeros((0,), bool)
-    return InMode(system, sides < 0, sides == 0, flat, Jumps(changed, changed))
+    flags = jnp.asarray(sides) < 0, jnp.asarray(held)
+    return InMode(system, *flags, flat, Jumps(changed, changed))

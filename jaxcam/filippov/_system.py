@@ -15,6 +15,9 @@ class FilippovSystem(SwitchedSystem):
     state, even beyond the surface. Every floating-point field is a parameter. The state
     never jumps.
 
+    A start on the surface from which both fields point away has no unique motion; the
+    method `sides` chooses the side, by default that above.
+
     It is a [`jaxcam.hybrid.SwitchedSystem`][] with one surface: `jaxcam.simulate`,
     stroboscopes and `continuation.periodic_orbit` accept it.
 

@@ -69,7 +69,8 @@ class Settings(eqx.Module):
     """Compiler for runs that are not traced: `"llvm"`, which is faster but rejects a
     system with an unsupported operation; `"xla"`, which is also used for all traced
     runs and derivatives; or `"auto"`, LLVM if possible, otherwise XLA (also if JAX runs
-    on another device than the CPU). Results differ only by rounding.
+    on another device than the CPU). Results differ by
+    rounding, and where a function is not smooth by the tolerance.
     """
 
     @property

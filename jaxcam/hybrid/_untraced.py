@@ -49,8 +49,8 @@ def prepare(system, settings, t0, state, t1, differentiable):
     return _started(system.prepared(), settings, t0, state, t1, differentiable)
 
 
-def _started(system, settings, t0, state, t1, differentiable):
-    functions = Functions(system, state.shape[0], settings.plain)
+def _started(system, settings, t0, state, t1, differentiable, shared: bool = False):
+    functions = Functions(system, state.shape[0], settings.plain, shared=shared)
     plan = Plan.of(system, settings, t0, t1, differentiable=differentiable)
     x = tuple(state[i] for i in range(state.shape[0]))
     carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
@@ -65,7 +65,7 @@ def _said(progress, t, t0, t1) -> None:
 def _start(case, _=None):
     """Return the plan and the first state of a run of a prepared system."""
     system, settings, t0, state, t1 = case
-    _, plan, carried = _started(system, settings, t0, state, t1, False)
+    _, plan, carried = _started(*case, differentiable=False, shared=True)
     return plan, jax.tree.map(jnp.asarray, carried)
 
 

@@ -26,10 +26,13 @@ class RockingBlock(HybridSystem):
     The state is (angle, lift, angle rate, lift rate). The lift is the angle's absolute
     value while a corner is in contact; the gaps of the left and the right corner are
     lift + angle and lift - angle. `rocking` returns the state for a given angle and
-    rate. With the restitution of Housner, the contact force is that of the corner
-    divided by a mass; with another one, the rates are those above, as long as `|a|`
-    is below (1 + restitution) / (1 - restitution) g tan(alpha): beyond, the corner
-    leaves the floor.
+    rate.
+
+    At small angles, the corner stays on the floor as long as `|a|` is below
+    (1 + restitution) / (1 - restitution) g tan(alpha); beyond, it leaves the floor, as
+    that of a real block does if `restitution` is `housner_restitution`. The contact
+    forces are those of a real block, divided by its mass and `half_width`, only while
+    it stands. A block that has fallen over is not stopped by the floor.
 
     G. W. Housner, The behavior of inverted pendulum structures during earthquakes,
     Bulletin of the Seismological Society of America 53 (1963); S. J. Hogan, On the

@@ -28,8 +28,8 @@ MOVES = frozenset(
 # maximum number of values that a scatter may combine: the bits of a float
 _BITS = 52
 # maximum size of a table whose elements are selected by comparison with an unknown
-# index
-_MOST = 512
+# index; XLA compiles longer ones sooner
+_MOST = 64
 
 
 def known(elements: np.ndarray) -> bool:

@@ -2,7 +2,6 @@
 
 import ctypes
 import logging
-import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -12,11 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax.interpreters import partial_eval
 
+from ..caches import Cache
 from ..loop import Functions, iteration, LoopState
 from ._kernel import ENTRY, module_of, Program
 from ._layout import Layout
 from ._machine import Compiled, compiled
-from ._writer import Lacking
+from ._writer import compiled_or_lacking, Lacking
 
 
 # rounds per call; between calls, Python can be interrupted or show progress
@@ -70,7 +70,7 @@ def traced(key: Key) -> Program:
         parts = key.own.tree(own), key.shared.tree(shared)
         system, plan = eqx.combine(*parts, static)
         lane = jax.tree.unflatten(key.lane, scalars)
-        functions = Functions(system, len(lane.x), plan.plain)
+        functions = Functions(system, len(lane.x), plan.plain, shared=True)
         after, record = iteration(functions, plan, lane)
         place, values = key.row(record, after)
         return [jnp.asarray(v) for v in (*jax.tree.leaves(after), place, *values)]
@@ -154,8 +154,7 @@ class Attempts:
         return int(cursor[1])
 
 
-_KNOWN: dict[Key, Attempts | str] = {}
-_LOCK = threading.Lock()
+_KNOWN = Cache()
 
 
 def attempts_of(key: Key) -> Attempts:
@@ -164,16 +163,7 @@ def attempts_of(key: Key) -> Attempts:
     **Raises:** `Lacking` if the program needs an operation that the backend does not
     have.
     """
-    with _LOCK:
-        if key not in _KNOWN:
-            try:
-                _KNOWN[key] = Attempts(key)
-            except Lacking as lacking:
-                _KNOWN[key] = str(lacking)
-        found = _KNOWN[key]
-    if isinstance(found, str):
-        raise Lacking(found)
-    return found
+    return compiled_or_lacking(_KNOWN, key, lambda: Attempts(key))
 
 
 def say_lacking(lacking: Lacking, demanded: bool) -> None:

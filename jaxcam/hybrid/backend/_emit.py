@@ -66,10 +66,10 @@ class Emitter:
             return while_loop(self.w, self.program, equation, inputs)
         if name == "scan":
             return scan(self.w, self.program, operations, equation, inputs)
-        dtypes = [v.aval.dtype for v in equation.invars]
-        output = equation.outvars[0].aval
         if equation.effects:
             raise Lacking(name)
+        dtypes = [v.aval.dtype for v in equation.invars]
+        output = equation.outvars[0].aval
         if name in MOVES and has_known_indices(equation, inputs):
             return moved(equation, inputs)
         if inputs and all(map(known, inputs)):

@@ -1,17 +1,17 @@
 """Call functions of pytrees row by row, compiled by LLVM."""
 
-import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import numpy as np
 
+from ..caches import Cache
 from ._layout import laid_out, Layout
 from ._machine import vector_width
 from ._mapped import Mapped
-from ._writer import Lacking
+from ._writer import compiled_or_lacking, Lacking
 
 
 # maximum number of results of a row: each is written as separate instructions
@@ -38,8 +38,7 @@ class Rowwise:
     def __init__(self, function: Callable, width: int | None = None):
         self._function = function
         self._width = vector_width() if width is None else width
-        self._known: dict[Hashable, _Compiled | str] = {}
-        self._lock = threading.Lock()
+        self._cache = Cache()
 
     def __call__(self, shared, rows, count: int):
         """Return the results for `count` rows.
@@ -68,16 +67,9 @@ class Rowwise:
         leaves, structure = jax.tree.flatten(static)
         kinds = tuple((type(leaf), leaf) for leaf in leaves)
         key = kinds, structure, layout, row
-        with self._lock:
-            if key not in self._known:
-                try:
-                    self._known[key] = self._made(static, layout, row)
-                except Lacking as lacking:
-                    self._known[key] = str(lacking)
-            found = self._known[key]
-        if isinstance(found, str):
-            raise Lacking(found)
-        return found
+        return compiled_or_lacking(
+            self._cache, key, lambda: self._made(static, layout, row)
+        )
 
     def _made(self, static, layout: Layout, row: Layout) -> _Compiled:
         parts = []

@@ -5,10 +5,13 @@ moves computations with such values out of the loop.
 """
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import llvmlite.ir as ir
 import numpy as np
+
+from ..caches import Cache
 
 
 # a product and a sum may be fused without intermediate rounding, as in XLA
@@ -35,6 +38,30 @@ def kind_of(dtype) -> Any:
     if str(dtype) not in _KINDS:
         raise Lacking(f"numbers of type {dtype}")
     return _KINDS[str(dtype)]
+
+
+def compiled_or_lacking(cache: Cache, key, make: Callable):
+    """Return what is compiled once for a key.
+
+    **Raises:** `Lacking`, also if tracing or compiling fails otherwise: XLA then runs
+    the program, or reports the error in it.
+    """
+
+    def attempt():
+        try:
+            return make()
+        except Lacking as lacking:
+            return str(lacking)
+        except Exception as error:
+            return f"a program that ends in {type(error).__name__}: {error}"
+
+    try:
+        found = cache.get(key, attempt)
+    except TypeError:
+        found = attempt()
+    if isinstance(found, str):
+        raise Lacking(found)
+    return found
 
 
 def is_float(dtype) -> bool:

@@ -229,7 +229,7 @@ def _first_of(shared, row) -> LoopState:
     (t0, rest), (own, state) = shared, row
     system, plan = eqx.combine(own, rest)
     x = tuple(state[i] for i in range(state.shape[0]))
-    functions = Functions(system, len(x), plan.plain)
+    functions = Functions(system, len(x), plan.plain, shared=True)
     limits = plan.t1, plan.longest_step, plan.repeat
     lane = first_state(functions, t0, x, *limits)
     return jax.tree.map(jnp.asarray, lane)

@@ -25,12 +25,16 @@ class Functions:
 
     `planar` systems have two states, one constraint and no surface: gap and normal
     velocity determine the state during contact, which then needs no integration.
-    `plain` functions are called unchanged, with arrays.
+    `plain` functions are called unchanged, with arrays. `shared` programs are traced
+    once for all runs of this kind of system, which only runs that are not traced may
+    assume: a new trace of a user sees what has changed since the last one.
     """
 
-    def __init__(self, system: HybridSystem, n: int, plain: bool = False):
+    def __init__(
+        self, system: HybridSystem, n: int, plain: bool = False, *, shared: bool = False
+    ):
         parameters, static = eqx.partition(system, eqx.is_inexact_array)
-        found = programs_of(static, parameters, n, plain)
+        found = programs_of(static, parameters, n, plain=plain, shared=shared)
         self._program = found.by_name
         self.n, self.m, self.k = n, found.m, found.k
         self.plain, self.planar = plain, found.planar

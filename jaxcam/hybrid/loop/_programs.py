@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._switched import SwitchedSystem
+from ..caches import Cache
 from ..lowering import joined, motion_series, scalarise
 from ..surface import (
     beyond_shares,
@@ -50,7 +51,7 @@ from ._jumps import jumping_components
 
 # highest derivatives that a step uses, of each part of `Distances`
 _ORDERS = (3, 1, 3, 0)
-# most kinds of systems whose programs are kept
+# largest number of kinds of systems whose programs are kept
 _MOST = 128
 
 
@@ -171,7 +172,7 @@ def _unchanged(whole, series: bool, parameters, *arguments, memory=None):
 
 
 class _Kind(NamedTuple):
-    """What the programs of a system depend on; hashable unless a part is not."""
+    """What the programs of a system depend on."""
 
     # parts that are not parameters, with their types: 1, 1.0 and True compare equal
     leaves: tuple
@@ -181,19 +182,23 @@ class _Kind(NamedTuple):
     n: int
 
 
-_KNOWN: dict[_Kind, Programs] = {}
+_KNOWN = Cache(_MOST)
 
 
-def programs_of(static, parameters, n: int, plain: bool) -> Programs:
-    """Return the programs of a system, traced once for each kind.
+def programs_of(static, parameters, n: int, *, plain: bool, shared: bool) -> Programs:
+    """Return the programs of a system.
 
     **Arguments:** the system without its parameters; its parameters, of which only
-    shapes and types matter; the number of its states; and whether its functions are
-    called unchanged.
+    shapes and types matter; the number of its states; whether its functions are called
+    unchanged; and whether the programs are traced once for all runs of such a system.
     """
     shapes = jax.tree.map(lambda p: jax.ShapeDtypeStruct(p.shape, p.dtype), parameters)
-    if plain:
+
+    def make() -> Programs:
         return Programs(static, shapes, n, plain)
+
+    if plain or not shared:
+        return make()
     leaves, structure = jax.tree.flatten(static)
     sizes, where = jax.tree.flatten(shapes)
     kind = _Kind(
@@ -204,14 +209,7 @@ def programs_of(static, parameters, n: int, plain: bool) -> Programs:
         n,
     )
     try:
-        found = _KNOWN.get(kind)
+        return _KNOWN.get(kind, make, lambda made: made.portable)
     except TypeError:
-        # an array of integers, for example
-        return Programs(static, shapes, n, plain)
-    if found is None:
-        found = Programs(static, shapes, n, plain)
-        if found.portable:
-            if len(_KNOWN) >= _MOST:
-                _KNOWN.pop(next(iter(_KNOWN)), None)
-            _KNOWN[kind] = found
-    return found
+        # not hashable: an array of integers, for example
+        return make()

@@ -67,11 +67,11 @@ class _Run(NamedTuple):
     scale: Any
 
 
-def _sampled(run: _Run, point: _Point):
+def _sampled(run: _Run, point: _Point, shared: bool = True):
     """Return the state at one time; NaN beyond the interval of the run."""
     system, settings, first, last, scale = run
     n = point.state.shape[0]
-    functions = Functions(system, n, settings.plain)
+    functions = Functions(system, n, settings.plain, shared=shared)
     x = tuple(point.state[i] for i in range(n))
     mode = tuple(point.contact[i] for i in range(functions.m))
     sides = [point.sides[i] for i in range(functions.k)]
@@ -115,7 +115,7 @@ def sample(system, settings: Settings, steps: Steps, times):
     """Return the states at some times, `(times, n)`, in a program of XLA."""
     run = _run_of(system.prepared(), settings, steps, jnp)
     points = _points_of(steps, times, jnp)
-    return jax.vmap(lambda point: _sampled(run, point))(points)
+    return jax.vmap(lambda point: _sampled(run, point, shared=False))(points)
 
 
 def sample_known(system, settings: Settings, steps: Steps, times) -> np.ndarray:

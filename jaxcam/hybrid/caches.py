@@ -1,0 +1,61 @@
+"""Keep what has been traced and compiled, and forget it on demand."""
+
+import threading
+import weakref
+from collections.abc import Callable, Hashable
+from typing import Any
+
+import jax
+
+
+_ALL: "weakref.WeakSet[Cache]" = weakref.WeakSet()
+
+
+class Cache:
+    """Results by their keys; the oldest are forgotten beyond a number.
+
+    **Arguments:** the largest number of results.
+    """
+
+    def __init__(self, most: int = 256):
+        self._most = most
+        self._results: dict[Hashable, Any] = {}
+        # a user's function may itself run a simulation while it is traced
+        self._lock = threading.RLock()
+        _ALL.add(self)
+
+    def get(self, key: Hashable, make: Callable[[], Any], keeps=lambda made: True):
+        """Return the result for a key, made once; it is kept if `keeps(result)`.
+
+        **Raises:** `TypeError` if the key is not hashable.
+        """
+        with self._lock:
+            if key in self._results:
+                return self._results[key]
+            made = make()
+            if keeps(made):
+                while len(self._results) >= self._most:
+                    del self._results[next(iter(self._results))]
+                self._results[key] = made
+            return made
+
+    def clear(self) -> None:
+        """Forget all results."""
+        with self._lock:
+            self._results.clear()
+
+
+def clear_caches() -> None:
+    """Forget all programs that jaxcam and JAX have compiled in this process.
+
+    Call it after you have replaced a method of a class, or a value that a method reads
+    from outside, since compiled programs contain the old one. Programs on disk remain;
+    they are found by their content.
+
+    Examples:
+        >>> import jaxcam
+        >>> jaxcam.clear_caches()
+    """
+    for cache in list(_ALL):
+        cache.clear()
+    jax.clear_caches()
