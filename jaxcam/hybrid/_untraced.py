@@ -64,7 +64,6 @@ def _said(progress, t, t0, t1) -> None:
 
 def _start(case, _=None):
     """Return the plan and the first state of a run of a prepared system."""
-    system, settings, t0, state, t1 = case
     _, plan, carried = _started(*case, differentiable=False, shared=True)
     return plan, jax.tree.map(jnp.asarray, carried)
 

@@ -8,6 +8,10 @@ import numpy as np
 from ._writer import kind_of, Lacking
 
 
+# each number is read by an instruction of its own
+_MOST = 4096
+
+
 class Layout(NamedTuple):
     """Positions of the arrays of a pytree in a vector of numbers; hashable."""
 
@@ -40,7 +44,7 @@ class Layout(NamedTuple):
 def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
     """Return the arrays of a pytree as 64-bit floats: `(size,)`, or `(elements, size)`.
 
-    **Raises:** `Lacking` if an element is not a number.
+    **Raises:** `Lacking` if an element is not a number, or if there are too many.
     """
     leaves, structure = jax.tree.flatten(tree)
     rows, shapes, dtypes = [], [], []
@@ -56,5 +60,7 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
         shapes.append(leaf.shape[head:])
         dtypes.append(leaf.dtype)
     numbers = np.concatenate([np.zeros((number, 0)), *rows], axis=1)
+    if numbers.shape[1] > _MOST:
+        raise Lacking(f"systems of more than {_MOST} numbers")
     layout = Layout(structure, tuple(shapes), tuple(dtypes))
     return np.ascontiguousarray(numbers[0] if lanes is None else numbers), layout
