@@ -37,7 +37,7 @@ SYSTEMS = {
     "RockingBlock": lambda: (models.RockingBlock(), [0.1, 0.1, 0.0, 0.0], 4.0),
     "SpinningBall": lambda: (
         models.SpinningBall(),
-        [0.0, 1.0, 0.0, 1.0, 0.0, 3.0],
+        [0.0, 1.0, 0.0, 1.0, 0.0],
         3.0,
     ),
 }
