@@ -200,6 +200,7 @@ class SingleShooting(AbstractProblem):
         del name
 
         def events(u, parameters):
+            parameters = jax.tree.map(_of_jax, parameters)
             u = jnp.asarray(u)
             times = self.times(u, parameters)
             return events_of(parameters, self.state(u), *times, self.settings)
@@ -258,6 +259,11 @@ class SingleShooting(AbstractProblem):
         if words[:2] != ["single", "shooting"] or len(words) != 6:
             return super().with_signature(signature)
         return dataclasses.replace(self, periods=int(words[3]), turns=int(words[5]))
+
+
+def _of_jax(leaf):
+    """Return an array of NumPy, as branches vary it, as one of JAX."""
+    return jnp.asarray(leaf) if isinstance(leaf, np.ndarray) else leaf
 
 
 @eqx.filter_jit
