@@ -69,7 +69,8 @@ class AbstractProblem(eqx.Module):
     `derivatives`, `local_dynamics`, `seen`, `watched`, `scale`. All their non-array
     data must be static, because one program is compiled for each problem structure and
     reused for all array values in it. `residual` and monitors with `ends=False` must be
-    smooth; where an orbit does not exist, return NaN, and the step is halved.
+    smooth, except for monitors with `corner`; where an orbit does not exist, return
+    NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,

@@ -8,8 +8,10 @@ import pytest
 import continuation
 import jaxcam
 from continuation.orbits._event_changes import events_of, name_of_change
+from jaxcam.filippov.modes import surface_rates
 from jaxcam.hybrid import flow, Settings
 from jaxcam.models import BeltOscillator, BouncingBall
+from jaxcam.thesis.chapter_2_dynamical_systems.figure_2_14 import sliding_events
 from variational.orbits import Event
 
 
@@ -24,26 +26,35 @@ def grazing_belt() -> float:
 
 
 def test_a_branch_through_grazing_and_switching_sliding():
-    """The belt oscillator: grazing-sliding to 1e-9; then the crossing begins."""
+    """Grazing-sliding to 1e-9; at switching-sliding, the lower field is tangent."""
     orbit = continuation.periodic_orbit(BELT, [0.0, 0.0], periods=1)
     found = continuation.branch(BELT, orbit, "belt", (1.0, 1.35), direction=-1)
     assert [p.kind for p in found.special] == ["grazing-sliding", "switching-sliding"]
     assert all(p.converged for p in found.special)
     first, second = (p.parameter for p in found.special)
     assert first == pytest.approx(grazing_belt(), abs=1e-9)
-    # bisection by simulation: the figure 2.14 of jaxcam.thesis
-    assert second == pytest.approx(1.036157193, abs=1e-8)
+    system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(second))
+    run = jaxcam.simulate(system, found.special[1].state, 0.0, float(BELT.period))
+    arrives = int(np.flatnonzero(np.asarray(run.switches.direction) == 1)[0])
+    state = run.switches.before[arrives]
+    above, _ = surface_rates(system, run.switches.time[arrives], state)
+    assert abs(float(above)) < 1e-6
     assert found.points[-1].parameter == pytest.approx(1.0)
 
 
 @pytest.mark.slow
 def test_a_branch_to_the_crossing_without_sliding():
-    """Down to a slow belt; events pass through the start of the period on the way."""
+    """The same three belt speeds as by bisection with simulations, to 1e-8.
+
+    On the way, events pass through the start of the period.
+    """
     orbit = continuation.periodic_orbit(BELT, [0.0, 0.0], periods=1)
     found = continuation.branch(BELT, orbit, "belt", (0.1, 1.35), direction=-1)
     kinds = ["grazing-sliding", "switching-sliding", "crossing-sliding"]
     assert [p.kind for p in found.special] == kinds
-    assert found.special[2].parameter == pytest.approx(0.413160730, abs=1e-8)
+    for point in found.special:
+        expected = sliding_events()[point.kind].belt
+        assert point.parameter == pytest.approx(expected, abs=1e-8)
     assert found.points[-1].parameter == pytest.approx(0.1)
 
 

@@ -94,7 +94,7 @@ class Programs:
 
     @property
     def portable(self) -> bool:
-        """Whether they may be used in any trace."""
+        """Whether they contain nothing of the trace in which they were made."""
         made = self.by_name.values()
         return not self._plain and all(one.portable for one in made)  # pyright: ignore
 

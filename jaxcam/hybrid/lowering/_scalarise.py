@@ -64,7 +64,7 @@ class SplitProgram:
     def __init__(self, call: Callable, *programs):
         self._call = call
         constants = [value for program in programs for value in program.consts]
-        # whether it may be used in any trace
+        # whether no constant belongs to the trace of its caller
         self.portable = not any(isinstance(value, Tracer) for value in constants)
 
     def __call__(self, *arguments, memory: Memory | None = None):
