@@ -65,11 +65,15 @@ class Settings(eqx.Module):
     reverse mode. It serves as a check of these passes, and as a fallback if one fails.
     """
 
-    backend: Literal["auto", "llvm", "xla"] = eqx.field(default="auto", static=True)
+    backend: Literal["auto", "llvm", "xla", "cuda"] = eqx.field(
+        default="auto", static=True
+    )
     """Compiler for runs that are not traced: `"llvm"`, which is faster but rejects a
     system with an unsupported operation; `"xla"`, which is also used for all traced
     runs and derivatives; or `"auto"`, LLVM if possible, otherwise XLA (also if JAX runs
-    on another device than the CPU). Results differ by
+    on another device than the CPU). With `"cuda"`, batches
+    ([`jaxcam.hybrid.stroboscope`][], sweeps, basins) run on an NVIDIA GPU, with one
+    thread for each trajectory, and all other runs as with `"llvm"`. Results differ by
     rounding, and where a function is not smooth by the tolerance.
     """
 
@@ -78,7 +82,17 @@ class Settings(eqx.Module):
         """Return whether LLVM compiles a run that is not traced."""
         if self.plain or self.backend == "xla":
             return False
-        return self.backend == "llvm" or jax.default_backend() == "cpu"
+        return self.demands or jax.default_backend() == "cpu"
+
+    @property
+    def demands(self) -> bool:
+        """Return whether a run that LLVM cannot compile is an error."""
+        return self.backend in ("llvm", "cuda")
+
+    @property
+    def on_gpu(self) -> bool:
+        """Return whether batches run on a GPU."""
+        return self.compiles and self.backend == "cuda"
 
     def check(self) -> None:
         """Raise `ValueError` if a setting is outside its range.
@@ -86,9 +100,9 @@ class Settings(eqx.Module):
         Raises:
             ValueError: A setting is outside its range.
         """
-        if self.backend not in ("auto", "llvm", "xla"):
+        if self.backend not in ("auto", "llvm", "xla", "cuda"):
             raise ValueError(
-                f'backend is {self.backend!r}; choose "auto", "llvm" or "xla"'
+                f'backend is {self.backend!r}; choose "auto", "llvm", "xla" or "cuda"'
             )
         if not 0 < float(self.tolerance) < 1:
             raise ValueError(

@@ -22,6 +22,8 @@ from .surface import check_restitution, restitutions
 
 # ratio of trajectories in a group to those in a block
 _GROUP = 64
+# numbers in the samples of a group on a GPU, which runs as many at once as there are
+_ON_GPU = 2**27
 
 
 class Stroboscope(Printed):
@@ -158,6 +160,9 @@ def stroboscope(
     width = min(block, lanes)
     shares = -(-lanes // (workers * width))
     group = width * min(_GROUP, shares)
+    if settings.on_gpu:
+        each = (turns - skip + 1) * (states.shape[1] + 2)
+        group = max(group, _ON_GPU // each)
 
     all_lanes = Lanes(system, where, values, states)
 

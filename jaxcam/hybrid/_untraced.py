@@ -40,7 +40,7 @@ def run_untraced(
         try:
             return _by_llvm(*case, budget, progress)
         except Lacking as lacking:
-            say_lacking(lacking, settings.backend == "llvm")
+            say_lacking(lacking, settings.demands)
     return _by_xla(*case, budget, progress)
 
 

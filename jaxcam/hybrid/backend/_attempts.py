@@ -13,7 +13,7 @@ from jax.interpreters import partial_eval
 
 from ..caches import Cache
 from ..loop import Functions, iteration, LoopState
-from ._kernel import ENTRY, module_of, Program
+from ._kernel import COUNTERS, ENTRY, module_of, Program, ROUNDS, UNFINISHED
 from ._layout import Layout
 from ._machine import Compiled, compiled
 from ._writer import compiled_or_lacking, Lacking
@@ -108,16 +108,21 @@ class Sizes(NamedTuple):
     steps: int
 
 
+def sizes_of(program: Program) -> Sizes:
+    """Return the sizes of a program."""
+    return Sizes(len(program.dtypes), program.own, program.row, program.steps)
+
+
 class Attempts:
     """The compiled loop of attempts for one key."""
 
     def __init__(self, key: Key):
         program = traced(key)
         # the program itself takes megabytes
-        self.sizes = Sizes(len(program.dtypes), program.own, program.row, program.steps)
+        self.sizes = sizes_of(program)
         self.width = key.width
         text = str(module_of(program, key.width))
-        self.function: Compiled = compiled(text, ENTRY, ctypes.c_int64, _ARGUMENTS)
+        self.function: Compiled = compiled(text, ENTRY, None, _ARGUMENTS)
 
     def run(
         self,
@@ -143,15 +148,18 @@ class Attempts:
         columns = self.sizes.state + self.sizes.own
         slots = np.zeros((columns, width))
         work = np.full(width, -1, dtype=np.int64)
-        order, cursor = np.arange(count), np.zeros(2, dtype=np.int64)
-        arrays = shared, own, lanes, slots, work, order, cursor, table
+        order, counters = np.arange(count), np.zeros(len(COUNTERS), dtype=np.int64)
+        arrays = shared, own, lanes, slots, work, order, counters, table
         assert all(a.flags.c_contiguous for a in arrays)
         pointers = [a.ctypes.data for a in arrays]
         numbers = count, table.shape[1], float(first), float(limit), _PATIENCE
-        while self.function(*pointers, *numbers):
+        while True:
+            counters[UNFINISHED] = 0
+            self.function(*pointers, *numbers)
+            if not counters[UNFINISHED]:
+                return int(counters[ROUNDS])
             if between is not None:
                 between()
-        return int(cursor[1])
 
 
 _KNOWN = Cache()

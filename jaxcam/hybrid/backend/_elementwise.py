@@ -4,6 +4,7 @@ Each function takes the writer, the parameters of the operation, the JAX type of
 operands, and the operands, which are either all scalars or all vectors.
 """
 
+import math
 from typing import no_type_check
 
 import llvmlite.ir as ir
@@ -95,6 +96,8 @@ def _of_doubles(w: Writer, name: str, dtype, x):
         made = exp2(w, x[0])
     elif name == "log":
         made = log(w, x[0])
+    elif name == "log2":
+        made = a.div(log(w, x[0]), math.log(2.0))
     elif name == "logistic":
         made = a.div(1.0, a.add(exp(w, b.fneg(x[0])), 1.0))
     elif name == "rem":
@@ -285,10 +288,9 @@ ELEMENTWISE: frozenset[str] = (
     frozenset(
         """
     abs add add_any and ceil clamp convert_element_type div eq exp exp2 floor ge gt
-    integer_pow is_finite le le_to log logistic lt lt_to max min mul ne neg not or rem
-    round rsqrt
-    select_n shift_left shift_right_arithmetic shift_right_logical sign sqrt square sub
-    xor
+    integer_pow is_finite le le_to log log2 logistic lt lt_to max min mul ne neg not
+    or rem round rsqrt select_n shift_left shift_right_arithmetic
+    shift_right_logical sign sqrt square sub xor
     """.split()
     )
     | LIBRARY

@@ -3,7 +3,9 @@
 The values of the active batch elements are in slots, with one row per value and one
 column per slot. Each round loads them, performs one attempt and stores the results.
 Rare operations (writing a row of the log, the end of a batch element) are done slot by
-slot in separate loops.
+slot in separate loops. On a CPU, one call works on all slots, as many as fit into a
+register. On a GPU, each thread works on one slot, and all threads take batch elements
+from one queue.
 """
 
 import contextlib
@@ -15,11 +17,15 @@ import numpy as np
 from ..codes import RUNNING
 from ._elementwise import converted
 from ._emit import Emitter
+from ._ptx import thread
 from ._writer import DOUBLE, INT64, Writer
 
 
 # name of the function in each module
 ENTRY = "run"
+# numbers that the calls (or threads) share: index of the next batch element, rounds so
+# far, and calls that ended before their batch elements
+QUEUE, ROUNDS, UNFINISHED = COUNTERS = range(3)
 _POINTER = DOUBLE.as_pointer()
 _COUNTS = INT64.as_pointer()
 _FLOAT = np.dtype(np.float64)
@@ -52,8 +58,8 @@ class _Arguments(NamedTuple):
     slots: Any
     work: Any
     order: Any
-    # index of the next batch element; number of rounds
-    cursor: Any
+    # `COUNTERS`
+    counters: Any
     log: Any
     queued: Any
     places: Any
@@ -67,24 +73,37 @@ _KINDS = (
 )
 
 
-def module_of(program: Program, width: int) -> ir.Module:
-    """Return a module with the function `ENTRY`, for vectors of `width` batch
-    elements.
+def module_of(program: Program, width: int, threads: bool = False) -> ir.Module:
+    """Return a module with the function `ENTRY`, for vectors of `width` batch elements,
+    or for the threads of a GPU.
     """
     module = ir.Module("attempts")
-    function = ir.Function(module, ir.FunctionType(INT64, _KINDS), ENTRY)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), _KINDS), ENTRY)
     for argument in function.args:
         if isinstance(argument.type, ir.PointerType):
             argument.add_attribute("noalias")
     builder = ir.IRBuilder(function.append_basic_block("entry"))
-    _Kernel(program, Writer(module, builder, width), _Arguments(*function.args)).write()
+    w = Writer(module, builder, width)
+    slots = _Slots(ir.Constant(INT64, 0), ir.Constant(INT64, width))
+    if threads:
+        function.calling_convention = "ptx_kernel"
+        slots = _Slots(*thread(w))
+    _Kernel(program, w, _Arguments(*function.args), slots).write()
     return module
+
+
+class _Slots(NamedTuple):
+    """The first slot of a call, and the number of slots of all calls."""
+
+    first: Any
+    number: Any
 
 
 @no_type_check
 class _Kernel:
-    def __init__(self, program: Program, writer: Writer, arguments: _Arguments):
+    def __init__(self, program, writer: Writer, arguments: _Arguments, slots: _Slots):
         self.p, self.w, self.b, self.a = program, writer, writer.builder, arguments
+        self.slots = slots
         self.states = len(program.dtypes)
         self.shared: list = []
 
@@ -136,9 +155,9 @@ class _Kernel:
         rounds.add_incoming(after, ended)
         rest.add_incoming(self._int(0), filled)
         rest.add_incoming(self._int(1), ended)
-        so_far = self._load(self.a.cursor, self._int(1))
-        self._store(b.add(so_far, rounds), self.a.cursor, self._int(1))
-        b.ret(rest)
+        self._count(ROUNDS, rounds)
+        self._count(UNFINISHED, rest)
+        b.ret_void()
 
     def _int(self, k: int):
         return ir.Constant(INT64, k)
@@ -148,6 +167,11 @@ class _Kernel:
 
     def _store(self, value, pointer, place) -> None:
         self.b.store(value, self.b.gep(pointer, [place]))
+
+    def _count(self, which: int, number):
+        """Add to a counter; return what it was before."""
+        place = self.b.gep(self.a.counters, [self._int(which)])
+        return self.b.atomic_rmw("add", place, number, "monotonic")
 
     @contextlib.contextmanager
     def _each(self, count):
@@ -166,13 +190,14 @@ class _Kernel:
         b.position_at_end(after)
 
     def _column(self, row):
-        """Return a row of the slots as a vector."""
-        place = self.b.gep(self.a.slots, [self._int(row * self.w.width)])
+        """Return the address of a row of the slots of this call, a vector."""
+        place = self.b.gep(self.a.slots, [self._slot(self._int(row), self._int(0))])
         return self.b.bitcast(place, self.w.vector(DOUBLE).as_pointer())
 
     def _slot(self, row, k):
-        """Return the address of one value of one slot."""
-        return self.b.add(self.b.mul(row, self._int(self.w.width)), k)
+        """Return the index of one value of one slot of this call."""
+        of_call = self.b.add(self.slots.first, k)
+        return self.b.add(self.b.mul(row, self.slots.number), of_call)
 
     def _bits(self, flags):
         """Return flags as the bits of one number."""
@@ -198,7 +223,8 @@ class _Kernel:
         """
         b, a = self.b, self.a
         with self._each(self._int(self.w.width)) as k:
-            lane = self._load(a.work, k)
+            mine = b.add(self.slots.first, k)
+            lane = self._load(a.work, mine)
             busy = b.icmp_signed(">=", lane, self._int(0))
             status = self._load(a.slots, self._slot(self._int(self.p.status), k))
             steps = self._load(a.slots, self._slot(self._int(self.p.steps), k))
@@ -212,33 +238,39 @@ class _Kernel:
                     a.lanes,
                     lambda i: b.add(base, i),
                 )
-                self._store(self._int(-1), a.work, k)
-            free = b.icmp_signed("<", self._load(a.work, k), self._int(0))
-            at = self._load(a.cursor, self._int(0))
-            waits = b.icmp_signed("<", at, a.queued)
-            with b.if_then(b.and_(free, waits)):
-                fresh = self._load(a.order, at)
-                self._store(b.add(at, self._int(1)), a.cursor, self._int(0))
-                self._store(fresh, a.work, k)
-                states = b.mul(fresh, self._int(self.states))
-                self._copy(
-                    self.states,
-                    a.lanes,
-                    lambda i: b.add(states, i),
-                    a.slots,
-                    lambda i: self._slot(i, k),
-                )
-                owned = b.mul(fresh, self._int(self.p.own))
-                self._copy(
-                    self.p.own,
-                    a.own,
-                    lambda i: b.add(owned, i),
-                    a.slots,
-                    lambda i: self._slot(b.add(i, self._int(self.states)), k),
-                )
-        work = b.bitcast(a.work, self.w.vector(INT64).as_pointer())
+                self._store(self._int(-1), a.work, mine)
+            lane = self._load(a.work, mine)
+            with b.if_then(b.icmp_signed("<", lane, self._int(0))):
+                at = self._count(QUEUE, self._int(1))
+                with b.if_then(b.icmp_signed("<", at, a.queued)):
+                    self._take(self._load(a.order, at), mine, k)
+        work = b.bitcast(b.gep(a.work, [self.slots.first]), self._counts())
         lanes = b.load(work, align=8)
         return self._bits(b.icmp_signed(">=", lanes, self.w.like(lanes, 0)))
+
+    def _counts(self):
+        return self.w.vector(INT64).as_pointer()
+
+    def _take(self, lane, mine, k) -> None:
+        """Load a waiting batch element into a slot."""
+        b, a = self.b, self.a
+        self._store(lane, a.work, mine)
+        states = b.mul(lane, self._int(self.states))
+        self._copy(
+            self.states,
+            a.lanes,
+            lambda i: b.add(states, i),
+            a.slots,
+            lambda i: self._slot(i, k),
+        )
+        owned = b.mul(lane, self._int(self.p.own))
+        self._copy(
+            self.p.own,
+            a.own,
+            lambda i: b.add(owned, i),
+            a.slots,
+            lambda i: self._slot(b.add(i, self._int(self.states)), k),
+        )
 
     def _going(self, status, steps):
         """Return whether batch elements with this status and number of attempts
@@ -300,7 +332,7 @@ class _Kernel:
         rows = b.bitcast(row, _POINTER)
         with self._each(self._int(self.w.width)) as k:
             at = b.fsub(self._load(numbers, k), a.first)
-            lane = self._load(a.work, k)
+            lane = self._load(a.work, b.add(self.slots.first, k))
             last = b.sitofp(a.places, DOUBLE)
             fits = b.and_(
                 b.fcmp_ordered(">=", at, ir.Constant(DOUBLE, 0.0)),
@@ -312,7 +344,7 @@ class _Kernel:
                 self._copy(
                     p.row,
                     rows,
-                    lambda i: self._slot(i, k),
+                    lambda i: b.add(b.mul(i, self._int(self.w.width)), k),
                     a.log,
                     lambda i: b.add(base, i),
                 )

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..backend import (
     attempts_of,
+    cuda_attempts_of,
     key_of,
     Lacking,
     laid_out,
@@ -46,13 +47,13 @@ def run_refilled(
     start = start_lanes(lanes, horizon, settings, chunking.width)
     if settings.compiles:
         try:
-            return _by_llvm(start, chunking.max_steps, table)
+            return _by_llvm(start, chunking.max_steps, table, settings.on_gpu)
         except Lacking as lacking:
-            say_lacking(lacking, settings.backend == "llvm")
+            say_lacking(lacking, settings.demands)
     return _by_xla(start, chunking, table)
 
 
-def _by_llvm(start: LaneStart, max_steps: int, table: Table):
+def _by_llvm(start: LaneStart, max_steps: int, table: Table, on_gpu: bool):
     """Run the loop as LLVM code, which replaces ended batch elements itself."""
     count = start.numbers.shape[1]
     shared, shared_layout = laid_out(start.shared)
@@ -64,9 +65,9 @@ def _by_llvm(start: LaneStart, max_steps: int, table: Table):
         shared_layout,
         start.slots.example(),
         table.row,
-        vector_width(),
+        1 if on_gpu else vector_width(),
     )
-    loop = attempts_of(key)
+    loop = cuda_attempts_of(key) if on_gpu else attempts_of(key)
     loop.run(shared, own, numbers, table.numbers, first=table.first, limit=max_steps)
     place = start.slots.rows
     columns = [place.impacts, place.steps, place.status]
