@@ -142,6 +142,8 @@ class Attempt(NamedTuple):
     lands: Any
     # which constraint was hit, or surface crossed
     hit: list
+    # the Poincaré section is crossed
+    points: tuple
     # a constraint is hit; or the motion cannot leave the surface that it has reached
     strikes: Any
     stuck: Any
@@ -199,6 +201,10 @@ def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState
         struck=struck,
         crowded=crowded,
         crossed=_crossed(carried, attempt),
+        points=tuple(
+            old + jnp.where(good & new, 1.0, 0.0)
+            for old, new in zip(carried.points, attempt.points, strict=True)
+        ),
         stale=select(good, attempt.stale, carried.stale),
         origin=carried.origin,
         extents=moved_extents(carried.extents, carried.origin, attempt),

@@ -39,17 +39,21 @@ class StepVerdict(NamedTuple):
 
 
 def judge(
-    left: Jet, right: Jet, h, slack, rounding, scale, room, longest
+    left: Jet, right: Jet, h, slack, rounding, scale, room, longest, calm: bool = False
 ) -> StepVerdict:
     """Check the step of one free constraint for events.
 
     **Arguments:** the jets at both ends, the step length, the negative gap that is
     tolerated, the gap that rounding cannot distinguish from zero, the largest gap so
     far, the time left to the next requested time (an impact beyond it waits for a later
-    step), and the longest step that the error allows.
+    step), and the longest step that the error allows. At a Poincaré section, a motion
+    may stay `calm` at a distance that is tolerated: at rest on it, it would cross it by
+    rounding without end.
     """
     polynomial = bernstein(left, right, h)
     inward = moves_in(right, rounding)
+    if calm:
+        inward = inward & ((left.gap >= 0) | (right.gap < -slack))
     behind = (right.gap < -slack) | ((right.gap < 0) & inward)
     # on the surface at the start of the step and moving or pulled in: no time passes
     now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)

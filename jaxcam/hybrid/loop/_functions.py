@@ -42,6 +42,8 @@ class Functions:
         self.slidable = found.slidable
         # whether contacts have friction; whether impacts may coincide
         self.rubs, self.joins = found.rubs, found.joins
+        # direction in which crossings of the last surface, a Poincaré section, count
+        self.counts: int | None = found.counts
         self._parameters = parameters if plain else jax.tree.map(split, parameters)
         self._memory: Memory | None = None
 

@@ -22,7 +22,7 @@ from ._jam import Jam, jam_of_step, jams_after
 from ._landing import land, Landing
 from ._loop_state import LoopState
 from ._release import judge_contact, lets_go_before
-from ._row_kind import kind_of_switch, row_kind
+from ._row_kind import at_section, kind_of_switch, row_kind
 from ._select import any_of, of_constraint, select
 from ._series import off_rounding, taylor_of_release
 from ._settles import settles
@@ -38,6 +38,8 @@ class Record(NamedTuple):
     before: tuple
     after: tuple
     mode: tuple
+    # whether this is a point on the Poincaré section, if the system has one
+    points: tuple
 
 
 class Judged(NamedTuple):
@@ -74,7 +76,7 @@ def _iterate(
     made = make_step(functions, plan, carried, end)
     if carried.stale:
         carried, made = refreshed(carried, made)
-    judged = _judge_flights(plan, carried, end, made, rounding)
+    judged = _judge_flights(functions, plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
     landing = land(functions, plan, carried, end, made, lands, flown, rounding)
     chatter, begins = landing.chatter, landing.begins
@@ -117,6 +119,7 @@ def _iterate(
     finite = jnp.isfinite(sum(x) + t + sum(j.gap + j.velocity for j in jets))
     good = good & finite
     stopped = end.at_stop & (end.stop >= end.asked) & good & ~lands & ~released
+    points = at_section(functions, carried, landing, lands)
     attempt = Attempt(
         t=t,
         x=x,
@@ -138,6 +141,7 @@ def _iterate(
         hit=landing.hit,
         hidden=landing.hidden,
         loses=landing.loses,
+        points=points,
         strikes=landing.strikes,
         stuck=landing.stuck,
         jams=active & jams_after(functions, jam, good, begins, landing.seen, x, mode),
@@ -160,6 +164,7 @@ def _iterate(
         before=select(lands, landing.impact.before, x),
         after=select(begins, landing.impact.after, x),
         mode=mode,
+        points=tuple(p & good & active for p in points),
     )
     return after_attempt(plan, carried, attempt), record
 
@@ -171,7 +176,12 @@ def _suppressed(carried: LoopState, judged: Judged) -> tuple:
 
 
 def _judge_flights(
-    plan: Plan, carried: LoopState, end: StepEnd, made: Step, rounding
+    functions: Functions,
+    plan: Plan,
+    carried: LoopState,
+    end: StepEnd,
+    made: Step,
+    rounding,
 ) -> Judged:
     """Detect events at the gaps that are open."""
     h, jets = end.length, made.jets
@@ -193,6 +203,7 @@ def _judge_flights(
                 carried.sizes[k],
                 end.room,
                 carried.longest,
+                calm=functions.counts is not None and k + 1 == len(jets),
             ),
         )
         for k, jet in enumerate(jets)

@@ -44,6 +44,8 @@ class LoopState(NamedTuple):
     crowded: tuple
     # for switching surfaces: time of the last crossing
     crossed: tuple
+    # for a Poincaré section: number of crossings
+    points: tuple
     # for surfaces along which a motion can slide: the mode has changed since the jets
     # were computed, and those of surfaces (1) or of constraints as well (2) are old
     stale: tuple
@@ -183,6 +185,7 @@ def first_state(
         struck=(-jnp.inf * one,) * m if m > 1 else (),
         crowded=(0.0 * one,) if m > 1 else (),
         crossed=(-jnp.inf * one,) if functions.k else (),
+        points=() if functions.counts is None else (0.0 * one,),
         stale=(jnp.where(slides, 2.0, jnp.where(held, 1.0, 0.0)),)
         if functions.slidable
         else (),

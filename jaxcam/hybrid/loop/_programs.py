@@ -12,6 +12,7 @@ import numpy as np
 from .._switched import SwitchedSystem
 from ..caches import Cache
 from ..lowering import joined, motion_series, scalarise
+from ..sections import WithSection
 from ..surface import (
     beyond_shares,
     completion_coefficients,
@@ -84,6 +85,9 @@ class Programs:
         self.slidable = [i for i, changed in enumerate(self._jumps.held) if changed]
         self.rubs = m > 0 and has_friction(static)
         self.joins = may_hit_together(static, n, m)
+        # the direction in which crossings of the last surface are counted, or None
+        counts = isinstance(static, WithSection)
+        self.counts = static.direction if counts else None
         self.by_name: dict[str, Callable] = {}
         flags = jax.ShapeDtypeStruct((m,), jnp.bool_)
         self._flight(time, state, flags)

@@ -25,3 +25,17 @@ def kind_of_switch(carried, landing: Landing, lands, kind):
     kind = jnp.where(landing.slides, float(RowKind.SLIDE), kind)
     kind = jnp.where(landing.leaves, float(RowKind.LEAVE), kind)
     return jnp.where(landing.stuck, float(RowKind.STEP), kind)
+
+
+def at_section(functions, carried, landing: Landing, lands) -> tuple:
+    """Return whether an attempt ends at the Poincaré section, if there is one.
+
+    A jump of the state across the section is not a crossing.
+    """
+    if functions.counts is None:
+        return ()
+    crosses = lands & ~landing.strikes & ~landing.stuck & landing.hit[-1]
+    if functions.counts:
+        rises = carried.negative[-1]
+        crosses = crosses & (rises if functions.counts > 0 else ~rises)
+    return (crosses & ~carried.behind[-1],)

@@ -181,7 +181,7 @@ def run_reversible(
 def _empty_record(n: int, flags: int) -> Record:
     zero = 0.0
     state = (zero,) * n
-    return Record(zero, zero, zero, state, state, (zero,) * flags)
+    return Record(zero, zero, zero, state, state, (zero,) * flags, ())
 
 
 def _row(record: Record, _: LoopState) -> list:

@@ -1,14 +1,23 @@
 """Check initial states of a hybrid system, and compute default starts."""
 
 import sys
+from collections.abc import Callable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ...hybrid import HybridSystem
-from ...hybrid.batch import split_lanes
+from ...hybrid import HybridSystem, Settings
+from ...hybrid.batch import (
+    Chunking,
+    Horizon,
+    Lanes,
+    run_refilled,
+    split_lanes,
+    Table,
+)
 from ...hybrid.loop import starts_behind
 from ...hybrid.sizes import component_sizes
 from ...hybrid.surface import contact_state, gaps, least_gaps
@@ -18,6 +27,15 @@ from ._samples import BEHIND
 
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
 """Numbers of motions that advance together, for upper limits of the total number."""
+
+
+class Rows(NamedTuple):
+    """The rows of the logs that a section stores: see `Table`."""
+
+    row: Callable
+    places: int
+    columns: int
+    settings: Settings
 
 
 def chunk_rows(width: int) -> int:
@@ -146,6 +164,37 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
         part[code != 0] = np.nan if part.dtype.kind == "f" else 0
         made.append(part)
     return (*made, code)
+
+
+def run_tables(section, rows: "Rows", states, turns, where, values, watched=None):
+    """Run the motions of a section that can start, and store rows of their logs.
+
+    Args:
+        section: The section, with `system`, `t0`, `period`, `lanes` and `max_steps`.
+        rows: The rows to store, and the settings.
+        watched: The system to run, and its `where`; by default those of the section.
+
+    Returns:
+        The table, `(motions, places, columns)`; impacts and codes of the motions.
+    """
+    rows.settings.check()
+    system, chosen = (section.system, where) if watched is None else watched
+    system, settings = as_arrays(system), as_arrays(rows.settings)
+    period = section.period
+    period = None if period is None else jnp.asarray(period, jnp.float64)
+    when = Horizon(jnp.asarray(section.t0, dtype=jnp.float64), period, turns)
+
+    def run(states, values, width):
+        table = Table(rows.row, len(states), rows.places, rows.columns)
+        chunking = Chunking(width, chunk_rows(width), section.max_steps)
+        lanes = Lanes(system, chosen, values, states)
+        impacts, _, code = run_refilled(lanes, when, settings, chunking, table)
+        return table.numbers, impacts, code
+
+    parts = section.system, section.t0, states, where, values, section.lanes
+    tails = (rows.places, rows.columns), ()
+    numbers, impacts, code = run_lanes(run, *parts, tails)
+    return numbers, np.nan_to_num(impacts).astype(int), code
 
 
 def _rows(states):

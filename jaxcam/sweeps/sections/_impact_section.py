@@ -7,10 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid import HybridSystem, Settings
-from ...hybrid.batch import Chunking, Horizon, Lanes, run_refilled, Table
 from ...hybrid.codes import RowKind
-from ...parameters import as_arrays
-from ._hybrid_lanes import chunk_rows, run_lanes
+from ._hybrid_lanes import Rows, run_tables
 from ._samples import Samples
 from ._system_section import AbstractSystemSection
 
@@ -53,24 +51,9 @@ class ImpactSection(AbstractSystemSection):
         settings = self.settings
         if settings is None:
             settings = Settings(tolerance=1e-9, chatter_depth=0.01)
-        settings.check()
-        system = as_arrays(self.system)
-        settings = as_arrays(settings)
-        period = None if self.period is None else jnp.asarray(self.period, jnp.float64)
-        t0 = jnp.asarray(self.t0, dtype=jnp.float64)
-
-        def run(states, values, width):
-            table = Table(_Row(keep), len(states), keep + 1, 2 + n)
-            chunking = Chunking(width, chunk_rows(width), self.max_steps)
-            lanes = Lanes(system, where, values, states)
-            when = Horizon(t0, period, turns)
-            run = run_refilled(lanes, when, settings, chunking, table)
-            impacts, _, code = run
-            return *_found(table.numbers, impacts, keep), code
-
-        lanes = (self.system, self.t0, states, where, values, self.lanes)
-        tails = ((keep, n), (keep,), (keep,), (n,))
-        found, times, rests, final, code = run_lanes(run, *lanes, tails)
+        rows = Rows(_Row(keep), keep + 1, 2 + n, settings)
+        numbers, impacts, code = run_tables(self, rows, states, turns, where, values)
+        found, times, rests, final = _found(numbers, impacts, keep)
         return Samples(
             states=found,
             times=times,

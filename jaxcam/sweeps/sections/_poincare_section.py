@@ -1,23 +1,24 @@
-"""Sample any Poincaré section, one trajectory at a time."""
+"""Sample any Poincaré section."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ...hybrid import HybridSystem, Settings, simulate
-from ._hybrid_lanes import admissible
-from ._samples import BEHIND, Samples
+from ...hybrid import HybridSystem, Settings
+from ...hybrid.codes import RowKind
+from ...hybrid.sections import with_section
+from ._hybrid_lanes import Rows, run_tables
+from ._samples import Samples
 from ._system_section import AbstractSystemSection
 
 
 class PoincareSection(AbstractSystemSection):
     """Poincaré section: crossings of `function(t, state) = 0`, with their times.
 
-    Motions are computed one after the other by
-    [`jaxcam.simulate`][jaxcam.hybrid.simulate], which is suitable for dozens of motions
-    but slow for thousands.
+    A jump of the state across the section, by an impact, is not a crossing.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -27,7 +28,7 @@ class PoincareSection(AbstractSystemSection):
     """
 
     system: HybridSystem
-    """A [`jaxcam.hybrid.HybridSystem`][]."""
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     function: Callable = eqx.field(static=True)
     """Smooth scalar function of time and state, written with `jax.numpy`."""
     direction: int = eqx.field(default=1, static=True)
@@ -38,6 +39,10 @@ class PoincareSection(AbstractSystemSection):
     """Length of a period (s); default: the forcing period of the system."""
     settings: Settings | None = None
     """Accuracy settings; default: those of `simulate`."""
+    lanes: int = eqx.field(default=128, static=True)
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
+    max_steps: int = eqx.field(default=1_000_000, static=True)
+    """As for [`jaxcam.sweeps.Stroboscopic`][]."""
     regular: bool = eqx.field(default=False, static=True, init=False)
     """Samples are not one period apart."""
     impacting: bool = eqx.field(default=True, static=True, init=False)
@@ -46,49 +51,53 @@ class PoincareSection(AbstractSystemSection):
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)
         lanes, n = states.shape
-        lengths = np.broadcast_to(self.turn(where, values), (lanes,))
-        ready = admissible(self.system, self.t0, states, where, values)
-        made = Samples(
-            states=np.full((lanes, keep, n), np.nan),
-            times=np.full((lanes, keep), np.nan),
-            hits=np.zeros((lanes, keep), dtype=int),
-            rests=np.zeros((lanes, keep), dtype=int),
-            final=np.full((lanes, n), np.nan),
-            contact=np.zeros(lanes, dtype=bool),
-            code=np.where(ready, 0, BEHIND),
+        if self.direction not in (-1, 0, 1):
+            raise ValueError(
+                f"direction is {self.direction}; choose 1 for rising crossings, -1 for "
+                "falling ones, or 0 for both"
+            )
+        whole = with_section(self.system, self.function, self.direction, n)
+        inner = None if where is None else lambda s: where(s.system)
+        settings = Settings() if self.settings is None else self.settings
+        # one point more than asked for, so that events are counted from the last one
+        rows = Rows(_Row(keep + 1), keep + 2, 4 + n, settings)
+        parts = states, turns, where, values
+        numbers, _, code = run_tables(self, rows, *parts, watched=(whole, inner))
+        found = numbers[:, : keep + 1]
+        order = np.argsort(
+            np.nan_to_num(found[..., 0], nan=-1.0), axis=1, kind="stable"
         )
-        for lane in np.flatnonzero(ready):
-            system = self._system(where, None if values is None else values[lane])
-            t1 = self.t0 + turns * lengths[lane]
-            self._one(system, states[lane], t1, int(lane), made)
-        return made
+        found = np.take_along_axis(found, order[..., None], axis=1)
+        counts = np.diff(np.nan_to_num(found[..., 1:3]), axis=1)
+        missing = np.isnan(found[:, 1:, 0])
+        counts[missing] = 0.0
+        return Samples(
+            states=found[:, 1:, 4:],
+            times=found[:, 1:, 3],
+            hits=counts[..., 0].astype(int),
+            rests=counts[..., 1].astype(int),
+            final=numbers[:, keep + 1, 4:],
+            contact=np.zeros(lanes, dtype=bool),
+            code=code,
+        )
 
-    def _system(self, where, value) -> HybridSystem:
-        if where is None:
-            return self.system
-        value = jnp.asarray(value, dtype=jnp.float64)
-        several = isinstance(where(self.system), tuple)
-        return eqx.tree_at(where, self.system, tuple(value) if several else value)
 
-    def _one(self, system, state, t1, lane: int, made: Samples) -> None:
-        keep = made.states.shape[1]
-        run = simulate(system, state, self.t0, t1, settings=self.settings)
-        made.code[lane] = int(run.code)
-        if made.code[lane] != 0:
-            return
-        times, states = map(np.asarray, run.section(self.function, self.direction))
-        hits = np.asarray(run.impacts.time)
-        rests = np.asarray(run.contacts.start)[1:]
-        first = np.asarray(run.contacts.start)[:1]
-        rests = np.concatenate([first[first > self.t0], rests])
-        edges = np.concatenate([[self.t0], times])
-        count = min(keep, len(times))
-        if count:
-            made.states[lane, -count:] = states[-count:]
-            made.times[lane, -count:] = times[-count:]
-            made.hits[lane, -count:] = np.histogram(hits, edges)[0][-count:]
-            made.rests[lane, -count:] = np.histogram(rests, edges)[0][-count:]
-        made.final[lane] = np.asarray(run.final)
+class _Row(NamedTuple):
+    """Stores the last points in a ring buffer, and the state at the last stop.
+
+    A row contains the number of the point, the impacts and completed chatters so far,
+    the time and the state.
+    """
+
+    size: int
+
+    def __call__(self, record, lane):
+        (here,), (number,) = record.points, lane.points
+        earlier = number - 1.0
+        ring = earlier - self.size * jnp.floor(earlier * (1 / self.size) + 1e-9)
+        last = jnp.where(record.kind == float(RowKind.STOP), float(self.size), -1.0)
+        counts = [number, lane.impacts, lane.chatters]
+        return jnp.where(here, ring, last), [*counts, record.t, *record.after]
 
 
 def return_times(samples: Samples) -> np.ndarray:

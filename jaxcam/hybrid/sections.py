@@ -1,0 +1,134 @@
+"""Add a Poincaré section to a system, as one more switching surface."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ._switched import SwitchedSystem
+from ._system import HybridSystem
+from .surface import has_friction, surfaces
+
+
+class WithSection(SwitchedSystem):
+    """A system with a Poincaré section as its last switching surface.
+
+    The section changes neither the vector field nor the state. Steps end at it, and the
+    event loop counts its crossings in one direction, without those by impacts.
+    """
+
+    system: HybridSystem
+    function: Callable = eqx.field(static=True)
+    """Function of time and state that is zero on the section."""
+    direction: int = eqx.field(static=True)
+    """+1 to count rising crossings, -1 for falling ones, 0 for both."""
+    number: int = eqx.field(static=True)
+    """Number of switching surfaces of the system."""
+
+    def switching(self, t, state):
+        """Return the switching functions of the system, then that of the section."""
+        own = self._own(t, state, "switching", jnp.zeros(0))
+        last = jnp.asarray(self.function(t, state), dtype=jnp.float64)
+        return jnp.append(jnp.atleast_1d(own), last)
+
+    def branch(self, t, state, sides):
+        """Return the rates of the system."""
+        if isinstance(self.system, SwitchedSystem):
+            return self.system.branch(t, state, sides[:-1])
+        return self.system.vector_field(t, state)
+
+    def sides(self, t, state):
+        """Return the sides of the system, then that of the section."""
+        own = self._own(t, state, "sides", jnp.zeros(0))
+        return jnp.append(own, jnp.where(self.function(t, state) >= 0, 1.0, -1.0))
+
+    def reset(self, t, state, sides):
+        """Return the states after the crossings of the system, then the state."""
+        if not isinstance(self.system, SwitchedSystem):
+            return state[None]
+        own = jnp.atleast_2d(self.system.reset(t, state, sides[:-1]))
+        return jnp.concatenate([own, state[None]])
+
+    def gap(self, t, state):
+        """Return the gaps of the system."""
+        return self.system.gap(t, state)
+
+    def impact(self, t, state):
+        """Return the states after impacts of the system."""
+        return self.system.impact(t, state)
+
+    @property
+    def hysteresis(self) -> Any:
+        """Return the hysteresis of each surface."""
+        return self._each("hysteresis", 0.0)
+
+    @property
+    def holding(self) -> Any:
+        """Return the ratio of static to kinetic friction at each surface."""
+        return self._each("holding", 1.0)
+
+    @property
+    def restitution_kind(self):
+        """Return the kind of the coefficient of restitution of the system."""
+        if isinstance(self.system, SwitchedSystem):
+            return self.system.restitution_kind
+        return "kinematic"
+
+    @property
+    def period(self) -> Any:
+        """Return the period of the system."""
+        return self.system.period
+
+    @property
+    def breakpoints(self) -> Any:
+        """Return the breakpoints of the system."""
+        return self.system.breakpoints
+
+    @property
+    def active(self) -> bool:  # pyright: ignore
+        """Return whether impacts of the system may add energy."""
+        return self.system.active
+
+    def constraint_name(self, number: int) -> str:
+        """Return the name of a constraint of the system."""
+        return self.system.constraint_name(number)
+
+    def prepared(self) -> "WithSection":
+        """Return the prepared system with the same section."""
+        return eqx.tree_at(lambda s: s.system, self, self.system.prepared())
+
+    def check(self) -> None:
+        """Raise `ValueError` if a parameter of the system has no physical meaning."""
+        self.system.check()
+
+    def _own(self, t, state, name: str, otherwise):
+        if isinstance(self.system, SwitchedSystem):
+            return getattr(self.system, name)(t, state)
+        return otherwise
+
+    def _each(self, name: str, of_section: float):
+        """Return a value for each surface of the system, then that of the section."""
+        if not self.number:
+            return of_section
+        own = jnp.asarray(getattr(self.system, name), dtype=jnp.float64)
+        return jnp.append(jnp.broadcast_to(own, (self.number,)), of_section)
+
+
+class _WithSectionAndFriction(WithSection):
+    """A system with friction in its contacts, and a Poincaré section."""
+
+    def contact_friction(self, t, state, sides):
+        """Return the friction of each contact of the system."""
+        assert isinstance(self.system, SwitchedSystem)
+        return self.system.contact_friction(t, state, sides[:-1])
+
+
+def with_section(
+    system: HybridSystem, function: Callable, direction: int, n: int
+) -> WithSection:
+    """Return a system of `n` state components with a Poincaré section."""
+    kind = _WithSectionAndFriction if has_friction(system) else WithSection
+    shapes = jax.eval_shape(lambda x: surfaces(system, jnp.zeros(()), x), jnp.zeros(n))
+    return kind(system, function, direction, shapes.shape[0])
