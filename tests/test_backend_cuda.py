@@ -69,7 +69,9 @@ def _stub(monkeypatch):
         occupancyMaxActiveBlocksPerMultiprocessor=lambda *_: 1
     )
     device = types.SimpleNamespace(
-        compute_capability="80", attributes={"MultiProcessorCount": 3}
+        compute_capability="80",
+        attributes={"MultiProcessorCount": 3},
+        use=lambda: None,
     )
     cupy = types.SimpleNamespace(
         asarray=np.array,

@@ -53,10 +53,12 @@ class CudaAttempts:
         The arguments are those of `Attempts.run`.
         """
         cupy = _cupy()
+        # each thread of Python has to select the GPU, before it asks about the kernel
+        cupy.cuda.Device().use()
+        states, log = cupy.asarray(lanes), cupy.asarray(table)
         blocks = min(-(-len(lanes) // _BLOCK), self._resident())
         threads = blocks * _BLOCK
         columns = self.sizes.state + self.sizes.own
-        states, log = cupy.asarray(lanes), cupy.asarray(table)
         counters = cupy.zeros(len(COUNTERS), dtype=np.int64)
         arguments = (
             cupy.asarray(shared),

@@ -60,6 +60,9 @@ class Emitter:
             return self.program(*inside, inputs)
         if name in _NOTHING:
             return inputs
+        if name == "unstack":
+            rows = np.moveaxis(inputs[0], params["axis"], 0)
+            return [rows[k, ...] for k in range(len(rows))]
         if name == "cond":
             return branches(self.w, self.program, equation, inputs)
         if name == "while":
