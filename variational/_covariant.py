@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid import flow, HybridSystem, Settings
 from jaxcam.parameters import as_arrays
 
-from ._tangent_lanes import orthonormal
+from ._turn_frames import orthonormal
 
 
 class CovariantVectors(eqx.Module):

@@ -1,7 +1,7 @@
 """Compute Lyapunov exponents of a motion with impacts.
 
-The event loop runs without derivatives. Afterwards, the derivatives of all steps in its
-log are computed at once and multiplied in order. Systems with switching surfaces are
+The event loop is differentiated attempt by attempt, and a frame of tangent vectors is
+orthonormalised after each. If the LLVM backend lacks an operation, the flow is
 differentiated period by period instead.
 """
 
@@ -14,12 +14,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
+from jaxcam.hybrid.backend import Lacking, say_lacking
+from jaxcam.hybrid.batch import Horizon, Lanes
 from jaxcam.hybrid.checks import refuse_tracers
-from jaxcam.hybrid.codes import RowKind, RUNNING
 from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
-from ._tangent_lanes import first_frames, next_rows, ROWS
+from ._tangent_loop import frames_of_periods
 from ._turn_frames import first_turn, next_turns
 
 
@@ -73,9 +74,9 @@ def lyapunov_spectrum(
     """Compute all Lyapunov exponents, including impacts, by repeated
     orthonormalisation.
 
-    Each step is differentiated, with saltation matrices at events, and the product is
-    applied to a frame that is orthonormalised repeatedly (Benettin et al., Meccanica
-    15, 1980; for impacts Mueller, Chaos, Solitons and Fractals 5, 1995).
+    Tangent vectors pass through all steps and events of the motion, and are
+    orthonormalised repeatedly (Benettin et al., Meccanica 15, 1980; for impacts
+    Mueller, Chaos, Solitons and Fractals 5, 1995).
 
     Args:
         system: The system.
@@ -88,8 +89,7 @@ def lyapunov_spectrum(
         values: Value of that parameter in each motion, shape `(motions,)`.
         settings: Accuracy of the simulation; the default tolerance is 1e-12.
         blocks: Number of blocks for the standard error.
-        max_steps: Maximum number of attempted steps per motion, or per period if the
-            system has switching surfaces.
+        max_steps: Maximum number of attempted steps per motion, or per period with XLA.
         progress: Called with the fraction of periods completed.
 
     Returns:
@@ -97,7 +97,7 @@ def lyapunov_spectrum(
 
     Raises:
         ValueError: Shapes are inconsistent, there is no period, or a switching surface
-            has a hysteresis.
+            has a hysteresis and the backend is XLA.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -112,16 +112,30 @@ def lyapunov_spectrum(
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()
     _check(system, turns, turn, blocks, (where is None) == (values is None))
-    switched = isinstance(system, SwitchedSystem)
     system = as_arrays(system)
     settings = as_arrays(settings)
     state = real_array(state)
     single = state.ndim == 1 and values is None
     batched, shared, states = _lanes(system, state, where, values)
     length = None if turn is None else jnp.asarray(float(turn))
-    begin, end = (jnp.asarray(float(x)) for x in (t0, transient + turns))
+    begin = jnp.asarray(float(t0))
     returned = _restitutions(batched, shared, begin, states)
     check_restitution(system, returned[0] if single else returned)
+    told = (lambda _: None) if progress is None else progress
+    if settings.compiles:
+        chosen = None if where is None else pick(where, system)
+        lanes = Lanes(system, chosen, values, np.asarray(states))
+        when = Horizon(begin, length, transient + turns)
+        try:
+            found = frames_of_periods(lanes, when, settings, max_steps, told)
+            turns_of_lanes = _turn(batched, shared, length)
+            made = _summary(
+                _Seen.of(*found), found[3], turns_of_lanes, transient, blocks
+            )
+            return jax.tree.map(lambda leaf: leaf[0], made) if single else made
+        except Lacking as lacking:
+            say_lacking(lacking, settings.demands)
+    _refuse_hysteresis(system)
 
     done = 0.0
 
@@ -130,12 +144,10 @@ def lyapunov_spectrum(
         seen = _Seen(states.shape[0], transient + turns + 1, states.shape[1])
 
         def report():
-            if progress is not None:
-                progress(done + seen.share * states.shape[0] / padded)
+            told(done + seen.share * states.shape[0] / padded)
 
-        run = _by_turns if switched else _by_steps
-        given = batched, shared, length, begin, end, settings, max_steps
-        status = run(states, *given, seen, report)
+        given = batched, shared, length, begin, settings, max_steps
+        status = _by_turns(states, *given, seen, report)
         done += states.shape[0] / padded
         return _summary(seen, status, _turn(batched, shared, length), transient, blocks)
 
@@ -146,13 +158,6 @@ def lyapunov_spectrum(
 
 def _check(system, turns: int, turn: float | None, blocks: int, paired: bool) -> None:
     """Raise `ValueError` if the arguments do not fit together."""
-    if isinstance(system, SwitchedSystem):
-        if np.any(np.asarray(system.hysteresis) != 0):
-            raise ValueError(
-                "lyapunov_spectrum does not support hysteresis, because the state at "
-                "the start of a period does not determine the side; differentiate "
-                "jaxcam.hybrid.flow over the whole motion with jax.jacfwd"
-            )
     if turn is None and system.period is None:
         raise ValueError("this system has no forcing period; pass turn=... in seconds")
     if not 2 <= blocks <= turns:
@@ -166,25 +171,21 @@ def _check(system, turns: int, turn: float | None, blocks: int, paired: bool) ->
         )
 
 
-def _by_steps(
-    states, batched, shared, length, begin, end, settings, max_steps, seen, report
-):
-    """Fill `seen` from the derivatives of steps; return a code for each motion."""
-    carry = first_frames(batched, shared, length, states, begin, end, settings)
-    used = 0
-    while used < max_steps and np.any(np.asarray(carry.lane.status) == RUNNING):
-        carry, rows = next_rows(batched, shared, length, begin, end, settings, carry)
-        seen.take(*map(np.asarray, rows))
-        used += ROWS
-        report()
-    return carry.lane.status
+def _refuse_hysteresis(system) -> None:
+    switched = isinstance(system, SwitchedSystem)
+    if switched and np.any(np.asarray(system.hysteresis) != 0):
+        raise ValueError(
+            "lyapunov_spectrum supports hysteresis only with the LLVM backend, because "
+            "XLA differentiates period by period, and the state at the start of a "
+            "period does not determine the side; omit Settings(backend=...), or "
+            "differentiate jaxcam.hybrid.flow over the whole motion with jax.jacfwd"
+        )
 
 
 def _by_turns(
-    states, batched, shared, length, begin, end, settings, max_steps, seen, report
+    states, batched, shared, length, begin, settings, max_steps, seen, report
 ):
     """Fill `seen` from the derivatives of periods; return a code for each motion."""
-    del end
     carry = first_turn(states)
     while not seen.complete:
         carry, after = next_turns(
@@ -232,7 +233,18 @@ class _Seen:
         self.states = np.full((lanes, n), np.nan)
         self.logs[:, 0], self.hits[:, 0] = 0.0, 0.0
         self._filled = np.ones(lanes, dtype=int)
-        self._hits = np.zeros(lanes)
+
+    @staticmethod
+    def of(logs, hits, states, code) -> "_Seen":
+        """Return values at the ends of all periods, as a whole."""
+        del code
+        lanes, stops, n = logs.shape
+        seen = _Seen(lanes, stops + 1, n)
+        seen.logs[:, 1:], seen.hits[:, 1:] = logs, hits
+        # the last one that was reached
+        reached = np.isfinite(hits).sum(axis=1) - 1
+        seen.states[:] = states[np.arange(lanes), reached]
+        return seen
 
     @property
     def share(self) -> float:
@@ -254,21 +266,6 @@ class _Seen:
         self.hits[:, first : first + count] = hits[:, :count]
         self.states[:] = after[:, count - 1]
         self._filled += count
-
-    def take(self, kind, logs, after) -> None:
-        hit = (kind == RowKind.IMPACT) | (kind == RowKind.LAST_IMPACT)
-        hits = self._hits[:, None] + np.cumsum(hit, axis=1)
-        stop = kind == RowKind.STOP
-        rank = self._filled[:, None] + np.cumsum(stop, axis=1) - 1
-        who, row = np.nonzero(stop)
-        # rounding may set the end of the run apart from its last stop
-        real = rank[who, row] < self.logs.shape[1]
-        who, row = who[real], row[real]
-        self.logs[who, rank[who, row]] = logs[who, row]
-        self.hits[who, rank[who, row]] = hits[who, row]
-        self.states[who] = after[who, row]
-        self._filled += stop.sum(axis=1)
-        self._hits = hits[:, -1]
 
 
 def _summary(seen: _Seen, status, length, transient, blocks):

@@ -9,9 +9,6 @@ from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow
 
-from ._step_matrix import elementwise_product
-from ._tangent_lanes import orthonormal
-
 
 # periods between two checks from Python
 TURNS = 16
@@ -75,3 +72,26 @@ def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnF
         return jax.lax.scan(turn, carry, None, length=TURNS)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, carry)
+
+
+def elementwise_product(a, b):
+    """Multiply matrices by elementwise operations, for batches."""
+    return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
+
+
+def orthonormal(matrix: Float[Array, "n n"]):
+    """Orthonormalise columns (Gram-Schmidt); return them and the previous lengths.
+
+    A column of zeros remains zero.
+    """
+    columns, lengths = [], []
+    for k in range(matrix.shape[0]):
+        column = matrix[:, k]
+        # two passes are enough
+        for _ in range(2):
+            for earlier in columns:
+                column = column - jnp.sum(earlier * column) * earlier
+        length = jnp.sqrt(jnp.sum(column * column))
+        columns.append(column / jnp.where(length > 0, length, 1.0))
+        lengths.append(length)
+    return jnp.stack(columns, axis=1), jnp.stack(lengths)

@@ -12,7 +12,7 @@ import numpy as np
 from jax.interpreters import partial_eval
 
 from ..caches import Cache
-from ..loop import Functions, iteration, LoopState
+from ..loop import Functions, iteration
 from ._kernel import COUNTERS, ENTRY, module_of, Program, ROUNDS, UNFINISHED
 from ._layout import Layout
 from ._machine import Compiled, compiled
@@ -50,16 +50,20 @@ class Key(NamedTuple):
     # function from a record and the following state to a place in the log and a row
     row: Callable
     width: int
+    # function of `Functions`, plan and state that takes one attempted step
+    step: Callable
 
 
-def key_of(static, own: Layout, shared: Layout, lane: LoopState, row, width) -> Key:
+def key_of(
+    static, own: Layout, shared: Layout, lane, row, width, step: Callable = iteration
+) -> Key:
     """Return the key of an attempt for batch elements of this kind."""
     leaves, structure = jax.tree.flatten(static)
     scalars, lane_structure = jax.tree.flatten(lane)
     # 1, 1.0 and True compare equal but need different programs
     kinds = tuple((type(leaf), leaf) for leaf in leaves)
     dtypes = tuple(np.dtype(s.dtype) for s in scalars)
-    return Key(kinds, structure, own, shared, lane_structure, dtypes, row, width)
+    return Key(kinds, structure, own, shared, lane_structure, dtypes, row, width, step)
 
 
 def traced(key: Key) -> Program:
@@ -71,7 +75,7 @@ def traced(key: Key) -> Program:
         system, plan = eqx.combine(*parts, static)
         lane = jax.tree.unflatten(key.lane, scalars)
         functions = Functions(system, len(lane.x), plan.plain, shared=True)
-        after, record = iteration(functions, plan, lane)
+        after, record = key.step(functions, plan, lane)
         place, values = key.row(record, after)
         return [jnp.asarray(v) for v in (*jax.tree.leaves(after), place, *values)]
 

@@ -3,4 +3,5 @@
 from ._layout import Horizon as Horizon, Lanes as Lanes, split_lanes as split_lanes
 from ._refilled_lanes import Chunking as Chunking, run_refilled as run_refilled
 from ._table import Table as Table
+from ._tangents import run_tangents as run_tangents
 from ._turn_samples import TurnSamples as TurnSamples

@@ -28,10 +28,10 @@ _AT_ONCE = 16
 class LaneLayout(NamedTuple):
     """The matrix rows that hold each number of a batch element, and their types."""
 
-    rows: LoopState
+    rows: Any
     dtypes: tuple
 
-    def unpacked(self, numbers) -> LoopState:
+    def unpacked(self, numbers):
         """Return the batch element with these numbers."""
         leaves = [
             number.astype(dtype)
@@ -39,19 +39,19 @@ class LaneLayout(NamedTuple):
         ]
         return jax.tree.unflatten(jax.tree.structure(self.rows), leaves)
 
-    def example(self) -> LoopState:
+    def example(self):
         """Return the shapes of the scalars of a batch element."""
         kinds = [jax.ShapeDtypeStruct((), dtype) for dtype in self.dtypes]
         return jax.tree.unflatten(jax.tree.structure(self.rows), kinds)
 
 
-def packed(lane: LoopState):
+def packed(lane):
     """Return all numbers of one or more batch elements as rows of 64-bit floats."""
     xp = np if isinstance(jax.tree.leaves(lane)[0], np.ndarray) else jnp
     return xp.stack([xp.asarray(leaf, xp.float64) for leaf in jax.tree.leaves(lane)])
 
 
-def layout_of(lane: LoopState) -> LaneLayout:
+def layout_of(lane) -> LaneLayout:
     leaves, structure = jax.tree.flatten(lane)
     rows = jax.tree.unflatten(structure, range(len(leaves)))
     return LaneLayout(rows, tuple(leaf.dtype for leaf in leaves))
@@ -102,8 +102,17 @@ class LaneStart(NamedTuple):
     static: Any
 
 
-def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneStart:
-    """Return the start of the batch elements, of which `width` will run at a time."""
+def start_lanes(
+    lanes: Lanes,
+    horizon: Horizon,
+    settings,
+    width: int,
+    first_of: Rowwise | None = None,
+) -> LaneStart:
+    """Return the start of the batch elements, of which `width` will run at a time.
+
+    `first_of` returns the first states of a run with derivatives.
+    """
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
     # padded, so that two compiled programs suffice for any number of batch elements
@@ -114,8 +123,13 @@ def start_lanes(lanes: Lanes, horizon: Horizon, settings, width: int) -> LaneSta
         batched, shared = split_lanes(lanes.system, lanes.where, part)
         state = jnp.asarray(lanes.states[some])
         span = horizon.period, horizon.t0, whole
-        own, rest = _ready(batched, shared, *span, settings)
-        lane = _first(settings.compiles, horizon.t0, own, rest, state)
+        derived = first_of is not None
+        own, rest = _ready(batched, shared, *span, settings, derived)
+        if first_of is None:
+            lane = _first(settings.compiles, horizon.t0, own, rest, state)
+        else:
+            given = (jnp.asarray(horizon.t0, jnp.float64), rest), (own, state)
+            lane = first_of(*given, len(state))
         pieces.append((lane, own))
     slots = layout_of(pieces[0][0])
     shared, static = eqx.partition(rest, eqx.is_array)
@@ -195,7 +209,7 @@ def split_lanes(system, where, values):
 
 
 @eqx.filter_jit
-def _ready(batched, shared, period, t0, turns, settings):
+def _ready(batched, shared, period, t0, turns, settings, differentiable: bool):
     """Return system and plan, split into own and shared parts."""
 
     def prepared(batched):
@@ -209,7 +223,7 @@ def _ready(batched, shared, period, t0, turns, settings):
             t1,
             period=length,
             stop_period=length,
-            differentiable=False,
+            differentiable=differentiable,
         )
         return system, plan
 
