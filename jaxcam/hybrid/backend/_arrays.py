@@ -306,3 +306,17 @@ def extreme_place(w: Writer, name: str, elements, axes, dtype, index_dtype):
             place = w.choose(better, w.number(k, index_dtype), place)
         out[index] = place
     return out
+
+
+def element(value) -> np.ndarray:
+    """Return a value as an array without dimensions."""
+    out = np.empty((), dtype=object)
+    out[()] = value
+    return out
+
+
+def elements(values) -> np.ndarray:
+    """Return values as a vector."""
+    out = np.empty(len(values), dtype=object)
+    out[:] = values
+    return out

@@ -15,6 +15,7 @@ import llvmlite.ir as ir
 import numpy as np
 
 from ..codes import RUNNING
+from ._arrays import element, elements
 from ._elementwise import converted
 from ._emit import Emitter
 from ._ptx import thread
@@ -296,11 +297,11 @@ class _Kernel:
         b, p = self.b, self.p
         columns = [b.load(self._column(k), align=8) for k in range(self.states + p.own)]
         leaves = [
-            _element(converted(self.w, value, _FLOAT, dtype))
+            element(converted(self.w, value, _FLOAT, dtype))
             for value, dtype in zip(columns, p.dtypes)
         ]
         own = columns[self.states :]
-        numbers = [_elements(part) for part in (own, self.shared)]
+        numbers = [elements(part) for part in (own, self.shared)]
         made = Emitter(self.w).program(p.jaxpr, p.consts, [*numbers, *leaves])
         dtypes = [v.aval.dtype for v in p.jaxpr.outvars]
         kept = [
@@ -348,15 +349,3 @@ class _Kernel:
                     a.log,
                     lambda i: b.add(base, i),
                 )
-
-
-def _element(value) -> np.ndarray:
-    out = np.empty((), dtype=object)
-    out[()] = value
-    return out
-
-
-def _elements(values) -> np.ndarray:
-    out = np.empty(len(values), dtype=object)
-    out[:] = values
-    return out

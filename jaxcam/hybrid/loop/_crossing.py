@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from ._flight import moves_in
+from ._flight import moves_in, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._loop_state import LoopState
@@ -37,6 +37,20 @@ class Passed(NamedTuple):
     slides: list
     # whether the motion cannot leave a surface, and cannot slide along it
     stuck: Any
+
+
+def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h):
+    """Let a surface be crossed at once where a jump of the state has crossed it."""
+    m = len(carried.held)
+    for k, behind in enumerate(carried.behind, start=m):
+        now, seen = behind & (h == 0), verdicts[k]
+        verdicts[k] = seen._replace(
+            retake=seen.retake & ~now,
+            length=jnp.where(now, jnp.inf, seen.length),
+            lands=seen.lands | now,
+            offset=jnp.where(now, 0.0, seen.offset),
+        )
+    return verdicts
 
 
 def sides_after(

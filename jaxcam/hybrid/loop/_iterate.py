@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from ..breakpoints import after
 from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
-from ._crossing import of_constraints, refreshed
+from ._crossing import jumped_across, of_constraints, refreshed
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
@@ -209,7 +209,7 @@ def _judge_flights(
         for k, jet in enumerate(jets)
     ]
     if carried.crossed:
-        verdicts = _jumped_across(carried, verdicts, h)
+        verdicts = jumped_across(carried, verdicts, h)
     flown = earliest(verdicts)
     natural = jnp.minimum(carried.longest, plan.longest_step)
     # the motion suppressed by the multipliers counts as gap, since rounding is relative
@@ -228,20 +228,6 @@ def _judge_flights(
     over = waits & (behind < -of_constraint(slack, flown.constraint))
     good = fits & ~flown.retake & ~over & active
     return Judged(flown, lands, good, over, natural, held, tiny)
-
-
-def _jumped_across(carried: LoopState, verdicts: list[StepVerdict], h):
-    """Let a surface be crossed at once where a jump of the state has crossed it."""
-    m = len(carried.held)
-    for k, behind in enumerate(carried.behind, start=m):
-        now, seen = behind & (h == 0), verdicts[k]
-        verdicts[k] = seen._replace(
-            retake=seen.retake & ~now,
-            length=jnp.where(now, jnp.inf, seen.length),
-            lands=seen.lands | now,
-            offset=jnp.where(now, 0.0, seen.offset),
-        )
-    return verdicts
 
 
 def _judge_contacts(
