@@ -68,7 +68,7 @@ def _start(case, _=None):
     return plan, jax.tree.map(jnp.asarray, carried)
 
 
-_start_by_llvm, _start_by_xla = Rowwise(_start, width=1), eqx.filter_jit(_start)
+_STARTED = Rowwise(_start, width=1)
 
 
 def _row(record, lane: LoopState):
@@ -79,10 +79,7 @@ def _row(record, lane: LoopState):
 def _by_llvm(system, settings, t0, state, t1, budget, progress):
     system = prepared(system)
     case = system, settings, t0, state, t1
-    try:
-        plan, carried = _start_by_llvm.once(case)
-    except Lacking:
-        plan, carried = _start_by_xla(case)
+    plan, carried = _STARTED.once(case, compiles=True)
     arrays, static = eqx.partition((system, plan), eqx.is_array)
     shared, layout = laid_out(arrays)
     _, nothing = laid_out(jax.tree.map(lambda _: None, arrays))

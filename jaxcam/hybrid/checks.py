@@ -1,9 +1,6 @@
 """Detect invalid input before anything is compiled; each message names the fix."""
 
-import contextlib
 import hashlib
-from collections.abc import Callable
-from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,7 +12,7 @@ from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 from ._settings import Settings
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
-from .backend import Lacking, Rowwise
+from .backend import Rowwise
 from .loop import starts_behind
 from .surface import check_restitution, restitutions
 
@@ -70,7 +67,8 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
             "so interchange them"
         )
     check_system(system, t0, state, settings)
-    behind, values = _evaluated(_STARTS_BEHIND, settings, system, t0, state)
+    case = system, t0, state
+    behind, values = _STARTS_BEHIND.once(case, compiles=settings.compiles)
     if not np.all(np.isfinite(values)):
         raise ValueError("the gap is not finite at t0; check the state and parameters")
     if behind:
@@ -80,27 +78,9 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
         )
 
 
-class _ByBoth(NamedTuple):
-    """A function of (system, time, state), compiled by LLVM and by XLA."""
-
-    llvm: Rowwise
-    xla: Callable
-
-    @staticmethod
-    def of(function) -> "_ByBoth":
-        by_llvm = Rowwise(lambda case, _: function(*case), width=1)
-        return _ByBoth(by_llvm, eqx.filter_jit(function))
-
-
-_STARTS_BEHIND, _RESTITUTIONS = _ByBoth.of(starts_behind), _ByBoth.of(restitutions)
-
-
-def _evaluated(function: _ByBoth, settings: Settings, *case):
-    """Return the results for values that are not traced, as NumPy arrays."""
-    if settings.compiles:
-        with contextlib.suppress(Lacking):
-            return function.llvm.once(case)
-    return jax.tree.map(np.asarray, function.xla(*case))
+# functions of (system, time, state)
+_STARTS_BEHIND = Rowwise(lambda case, _: starts_behind(*case), width=1)
+_RESTITUTIONS = Rowwise(lambda case, _: restitutions(*case), width=1)
 
 
 # systems that passed, because a check takes as long as a short run: by their shapes,
@@ -126,7 +106,8 @@ def check_system(system, t0, state, settings: Settings) -> None:
     system.check()
     if isinstance(system, SwitchedSystem):
         _check_switches(system)
-    check_restitution(system, _evaluated(_RESTITUTIONS, settings, system, t0, state))
+    found = _RESTITUTIONS.once((system, t0, state), compiles=settings.compiles)
+    check_restitution(system, found)
     if signature is not None:
         _WELL_SHAPED.add(signature)
         if len(_SOUND) >= _MANY:

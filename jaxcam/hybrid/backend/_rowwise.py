@@ -1,5 +1,6 @@
-"""Call functions of pytrees row by row, compiled by LLVM."""
+"""Call functions of pytrees row by row, compiled by LLVM or XLA."""
 
+import contextlib
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -28,8 +29,8 @@ class _Compiled(NamedTuple):
 class Rowwise:
     """A function of shared values and of one row, for rows that are not traced.
 
-    It is compiled once for each kind of arguments, in a small part of the time that XLA
-    takes.
+    It is compiled once for each kind of arguments: by LLVM, in a small part of the time
+    that XLA takes; or by XLA if LLVM is not wanted or lacks an operation.
 
     **Arguments:** `function(shared, row)` of pytrees, which returns a pytree; and the
     number of rows that are computed at once, by default as many as fit into a register.
@@ -40,13 +41,40 @@ class Rowwise:
         self._width = vector_width() if width is None else width
         self._cache = Cache()
 
-    def __call__(self, shared, rows, count: int):
+        self._by_xla = eqx.filter_jit(self._of_rows)
+
+    def __call__(self, shared, rows, count: int, *, compiles: bool):
         """Return the results for `count` rows.
 
-        **Arguments:** a pytree; a pytree of arrays with `count` rows; their number.
+        **Arguments:** a pytree; a pytree of arrays with `count` rows; their number; and
+        whether LLVM `compiles` the function, if it can.
 
         Returns:
             The result, a pytree of NumPy arrays with `count` rows.
+        """
+        if compiles:
+            with contextlib.suppress(Lacking):
+                return self.by_llvm(shared, rows, count)
+        # a power of two, so that few lengths are compiled
+        size = 1 << max(0, count - 1).bit_length()
+        index = np.minimum(np.arange(size), count - 1)
+        padded = jax.tree.map(lambda a: np.asarray(a)[index], rows)
+        made = self._by_xla(shared, padded, size)
+        return jax.tree.map(
+            lambda a: np.asarray(a)[:count] if eqx.is_array(a) else a, made
+        )
+
+    def _of_rows(self, shared, rows, size: int):
+        mapped = eqx.filter_vmap(
+            lambda row: self._function(shared, row),
+            in_axes=eqx.if_array(0),
+            out_axes=eqx.if_array(0),
+            axis_size=size,
+        )
+        return mapped(rows)
+
+    def by_llvm(self, shared, rows, count: int):
+        """Return the results for `count` rows, compiled by LLVM.
 
         **Raises:** `Lacking` with the name of an operation that the backend does not
         have.
@@ -58,9 +86,9 @@ class Rowwise:
         made = found.function(numbers, own)
         return eqx.combine(found.layout.tree(made), found.static)
 
-    def once(self, shared):
+    def once(self, shared, *, compiles: bool):
         """Return the result of a function that does not use its row."""
-        made = self(shared, (), 1)
+        made = self(shared, (), 1, compiles=compiles)
         return jax.tree.map(lambda a: a[0] if isinstance(a, np.ndarray) else a, made)
 
     def _compiled(self, static, layout: Layout, row: Layout) -> _Compiled:

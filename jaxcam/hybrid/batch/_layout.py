@@ -5,7 +5,6 @@ batch element instead would take four times as long: as long as 64 elements need
 chunk.
 """
 
-import contextlib
 import functools
 from collections.abc import Callable, Hashable
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._system import HybridSystem
-from ..backend import Lacking, Rowwise
+from ..backend import Rowwise
 from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
 from ..lowering import one_kernel, Packed, without_library
 
@@ -125,11 +124,11 @@ def start_lanes(
         span = horizon.period, horizon.t0, whole
         derived = first_of is not None
         own, rest = _ready(batched, shared, *span, settings, derived)
+        given = (jnp.asarray(horizon.t0, jnp.float64), rest), (own, state), len(state)
         if first_of is None:
-            lane = _first(settings.compiles, horizon.t0, own, rest, state)
+            lane = _FIRST(*given, compiles=settings.compiles)
         else:
-            given = (jnp.asarray(horizon.t0, jnp.float64), rest), (own, state)
-            lane = first_of(*given, len(state))
+            lane = first_of.by_llvm(*given)
         pieces.append((lane, own))
     slots = layout_of(pieces[0][0])
     shared, static = eqx.partition(rest, eqx.is_array)
@@ -249,21 +248,7 @@ def _first_of(shared, row) -> LoopState:
     return jax.tree.map(jnp.asarray, lane)
 
 
-_first_by_llvm = Rowwise(_first_of)
-
-
-@eqx.filter_jit
-def _first_by_xla(shared, rows):
-    return jax.vmap(lambda row: _first_of(shared, row))(rows)
-
-
-def _first(compiles: bool, t0, own, rest, states) -> LoopState:
-    """Return the first states of batch elements."""
-    shared, rows = (jnp.asarray(t0, jnp.float64), rest), (own, states)
-    if compiles:
-        with contextlib.suppress(Lacking):
-            return _first_by_llvm(shared, rows, len(states))
-    return _first_by_xla(shared, rows)
+_FIRST = Rowwise(_first_of)
 
 
 def _depends(function: Callable, argument):

@@ -1,6 +1,5 @@
 """Convert the log of a run to impacts, contacts and steps."""
 
-import contextlib
 from types import ModuleType
 from typing import NamedTuple
 
@@ -10,16 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._switched import SwitchedSystem
-from ..backend import Lacking, Rowwise
+from ..backend import Rowwise
 from ..codes import RowKind
 from ..loop import Log, rows_of_kind
 from ..surface import normal_velocity, surfaces
 from ._events import Contacts, Impacts, Steps, Switches
-
-
-# Numbers of velocities for which programs are compiled: the smallest, and the growth
-# factor
-_FEWEST, _LONGER = 1024, 4
 
 
 class Parts(NamedTuple):
@@ -180,22 +174,12 @@ def _speeds(xp: ModuleType, system, times, sides, which, compiles: bool):
         return times, times
     times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
     states = xp.concatenate(sides)
-    if xp is np and compiles:
-        with contextlib.suppress(Lacking):
-            points = times, states, which
-            speeds = _VELOCITIES(system, points, 2 * count)
-            return speeds[:count], speeds[count:]
+    points = times, states, which
     if xp is np:
-        # only a few lengths, because each is compiled
-        size = _FEWEST
-        while size < 2 * count:
-            size *= _LONGER
-        # padded with the last entry: a system may not be defined at zero
-        rows = np.minimum(np.arange(size), 2 * count - 1)
-        times, states, which = times[rows], states[rows], which[rows]
-    speeds = _normal_velocities(system, times, states, which)
-    speeds = xp.asarray(speeds)
-    return speeds[:count], speeds[count : 2 * count]
+        speeds = _VELOCITIES(system, points, 2 * count, compiles=compiles)
+    else:
+        speeds = _normal_velocities(system, *points)
+    return speeds[:count], speeds[count:]
 
 
 def _velocity_at(system, point):

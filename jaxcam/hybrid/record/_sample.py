@@ -1,6 +1,5 @@
 """Sample the state between points by one additional step of the same method."""
 
-import contextlib
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from .._prepared import prepared
 from .._settings import Settings
-from ..backend import Lacking, Rowwise
+from ..backend import Rowwise
 from ..breakpoints import between
 from ..loop import Functions
 from ..runge_kutta import step, tableau_of
@@ -29,16 +28,6 @@ def pad(array, fill):
         length *= 2
     rest = [(0, length - array.shape[0])] + [(0, 0)] * (array.ndim - 1)
     return jax.device_put(np.pad(array, rest, constant_values=fill))
-
-
-def padded(steps: Steps) -> Steps:
-    return Steps(
-        pad(steps.time, np.inf),
-        pad(steps.state, np.nan),
-        pad(steps.contact, False),
-        steps.count,
-        None if steps.sides is None else pad(steps.sides, 1.0),
-    )
 
 
 class _Point(NamedTuple):
@@ -90,7 +79,7 @@ def _sampled(run: _Run, point: _Point, shared: bool = True):
     return jnp.where(covered, jnp.stack(moved), jnp.nan)
 
 
-_BY_LLVM = Rowwise(_sampled)
+_SAMPLES = Rowwise(_sampled)
 
 
 def _run_of(system, settings: Settings, steps: Steps, xp: ModuleType) -> _Run:
@@ -120,14 +109,14 @@ def sample(system, settings: Settings, steps: Steps, times):
 
 def sample_known(system, settings: Settings, steps: Steps, times) -> np.ndarray:
     """Return the states at some times, `(times, n)`, of a run that is not traced."""
+    known = jax.tree.map(np.asarray, steps)
+    if not times.size:
+        return np.zeros((0, known.state.shape[1]))
     implicit = isinstance(settings.solver, diffrax.AbstractImplicitSolver)
-    if settings.compiles and not implicit and times.size:
-        known = jax.tree.map(np.asarray, steps)
-        run = _run_of(prepared(system), settings, known, np)
-        with contextlib.suppress(Lacking):
-            return _BY_LLVM(run, _points_of(known, times, np), len(times))
-    found = sample(system, settings, padded(steps), pad(times, np.nan))
-    return np.asarray(found)[: len(times)].copy()
+    run = _run_of(prepared(system), settings, known, np)
+    points = _points_of(known, times, np)
+    compiles = settings.compiles and not implicit
+    return _SAMPLES(run, points, len(times), compiles=compiles)
 
 
 def advance(
