@@ -156,14 +156,9 @@ def stroboscope(
     start = jnp.asarray(t0, dtype=jnp.float64)
     _check(*split_lanes(system, where, values), settings, start, length, states)
 
-    # groups bound the memory; each keeps its block busy until its last trajectories
     width = min(block, lanes)
-    shares = -(-lanes // (workers * width))
-    group = width * min(_GROUP, shares)
-    if settings.on_gpu:
-        each = (turns - skip + 1) * (states.shape[1] + 2)
-        group = max(group, _ON_GPU // each)
-
+    samples = (turns - skip + 1) * (states.shape[1] + 2)
+    group = _group(lanes, width, workers, _ON_GPU // samples if settings.on_gpu else 0)
     all_lanes = Lanes(system, where, values, states)
 
     def work(first):
@@ -182,6 +177,15 @@ def stroboscope(
             if progress is not None:
                 progress(min(1.0, len(pieces) * group / lanes))
     return Stroboscope(*map(np.concatenate, zip(*pieces, strict=True)))
+
+
+def _group(lanes: int, width: int, workers: int, least: int) -> int:
+    """Return the number of trajectories in a group, which bounds the memory.
+
+    Each group keeps its block busy until its last trajectories.
+    """
+    shares = -(-lanes // (workers * width))
+    return max(width * min(_GROUP, shares), least)
 
 
 def _one_for_each(states, values) -> np.ndarray:
