@@ -119,7 +119,6 @@ def _iterate(
     finite = jnp.isfinite(sum(x) + t + sum(j.gap + j.velocity for j in jets))
     good = good & finite
     stopped = end.at_stop & (end.stop >= end.asked) & good & ~lands & ~released
-    points = at_section(functions, carried, landing, lands)
     attempt = Attempt(
         t=t,
         x=x,
@@ -141,7 +140,7 @@ def _iterate(
         hit=landing.hit,
         hidden=landing.hidden,
         loses=landing.loses,
-        points=points,
+        points=at_section(functions, carried, landing, lands),
         strikes=landing.strikes,
         stuck=landing.stuck,
         jams=active & jams_after(functions, jam, good, begins, landing.seen, x, mode),
@@ -164,7 +163,7 @@ def _iterate(
         before=select(lands, landing.impact.before, x),
         after=select(begins, landing.impact.after, x),
         mode=mode,
-        points=tuple(p & good & active for p in points),
+        points=tuple(p & good & active for p in attempt.points),
     )
     return after_attempt(plan, carried, attempt), record
 
