@@ -33,7 +33,7 @@ def _rates(x, v, p, flow):
 
 @numba.njit
 def _step(state, flow, h, stages, after):
-    """Fill `after`; return the error relative to `tolerance`."""
+    """Fill `after`; return the error relative to that allowed, 1e-10."""
     for i in range(6):
         x, v, p = state[0], state[1], state[2]
         for j in range(i):

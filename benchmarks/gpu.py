@@ -34,7 +34,8 @@ def _settings(backend: str) -> Settings:
     return Settings(tolerance=1e-9, chatter_depth=1.0, backend=backend)
 
 
-# a system, the lowest and highest initial states, and its period, if it has none
+# a system, the lowest and highest initial states, and the period of the samples if it
+# is not that of the forcing
 CASES = {
     "CamFollower": (CamFollower(), (0.3, -3.0), (0.8, 3.0), None),
     "ImpactOscillator": (ImpactOscillator(), (-2.0, -1.0), (0.0, 1.0), None),
@@ -45,7 +46,7 @@ CASES = {
 
 
 def starts(system, low, high, number: int) -> np.ndarray:
-    """Draw admissible initial states."""
+    """Draw admissible initial states, at most `number`."""
     drawn = np.random.default_rng(0).uniform(low, high, (4 * number, len(low)))
     if isinstance(system, RockingBlock):
         drawn[:, 2:] = 0.0

@@ -72,6 +72,7 @@ def _stub(monkeypatch):
         compute_capability="80",
         attributes={"MultiProcessorCount": 3},
         use=lambda: None,
+        id=0,
     )
     cupy = types.SimpleNamespace(
         asarray=np.array,
@@ -194,3 +195,8 @@ def test_on_a_gpu():
     )
     assert np.abs(ours.states - theirs.states).max() < 1e-9
     assert np.array_equal(ours.impacts, theirs.impacts)
+
+
+def test_plain_programs_do_not_run_on_a_gpu():
+    with pytest.raises(ValueError, match="plain=True runs with XLA"):
+        Settings(plain=True, backend="cuda").check()

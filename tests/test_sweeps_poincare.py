@@ -3,8 +3,10 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook_systems import parameters, TwoMasses, TwoStops
 
 import jaxcam
+from jaxcam.hybrid import Settings
 from jaxcam.models import (
     BeltOscillator,
     BouncingBall,
@@ -94,3 +96,65 @@ def test_a_motion_at_rest_does_not_cross_a_section_without_end():
 def test_a_direction_is_one_of_three():
     with pytest.raises(ValueError, match="direction is 2"):
         PoincareSection(OSCILLATOR, lambda t, x: x[1], 2).sample([[-0.5, 1.0]], 2, 1)
+
+
+_P = parameters(
+    omega=1.7, stop=0.3, restitution=0.4, force=1.0, stiffness=1.0, damping=0.05
+)
+_RESTING = {
+    # on its wall, again and again
+    "wall": (ImpactOscillator(0.5, 0.5, 0.2, 0.05), [-0.1, 0.2], 1, 50.0),
+    # starts on its seat
+    "seat": (ReliefValve(), [0.0, 0.0, 5.0], 1, 8.0),
+    "one of two masses": (TwoMasses(**_P), [-0.1, 0.1, 0.2, -0.3], 2, 15.0),
+    "both masses": (TwoStops(**_P), [-0.1, 0.1, 0.2, -0.3], 2, 15.0),
+}
+
+
+@pytest.mark.parametrize("name", _RESTING)
+def test_rest_on_a_section_is_no_crossing(name):
+    """The velocity of a body at rest on a fixed constraint is zero. Points where it is
+    in flight: those of the trajectory, to 1e-8.
+    """
+    system, state, k, length = _RESTING[name]
+    section = PoincareSection(system, lambda t, x: x[k], 0, period=length)
+    samples = section.sample([state], 1, 200)
+    assert samples.code.tolist() == [0]
+    run = jaxcam.simulate(system, state, 0.0, length)
+    times = np.asarray(run.section(lambda t, x: x[k], 0)[0])
+    ends = np.concatenate([run.contacts.start, run.contacts.end, [0.0]])
+    ends = ends[np.isfinite(ends)]
+    flying = [np.min(np.abs(t - ends)) > 1e-6 for t in times]
+    found = samples.times[0][np.isfinite(samples.times[0])]
+    ours = [np.min(np.abs(t - ends)) > 1e-6 for t in found]
+    assert np.abs(found[ours] - times[flying]).max() < 1e-8
+
+
+@pytest.mark.parametrize("backend", ["llvm", "xla"])
+def test_either_backend_samples_a_section(backend):
+    samples = PoincareSection(
+        OSCILLATOR, lambda t, x: x[1], -1, settings=Settings(backend=backend)
+    ).sample([[-0.5, 1.0]], 4, 3)
+    run = jaxcam.simulate(OSCILLATOR, [-0.5, 1.0], 0.0, 4 * float(OSCILLATOR.period))
+    times = np.asarray(run.section(lambda t, x: x[1], -1)[0])
+    assert np.isnan(samples.times[0, :2]).all() and len(times) == 1
+    assert abs(samples.times[0, 2] - times[0]) < 1e-8
+
+
+def test_what_a_section_refuses():
+    start, of = [[-0.5, 1.0]], lambda t, x: x[1]
+    with pytest.raises(ValueError, match="restitution"):
+        PoincareSection(ImpactOscillator(restitution=1.4), of).sample(start, 2, 1)
+    with pytest.raises(ValueError, match="returns shape"):
+        PoincareSection(OSCILLATOR, lambda t, x: x).sample(start, 2, 1)
+    with pytest.raises(ValueError, match="no forcing period"):
+        PoincareSection(ReliefValve(), of).sample([[0.2, 0.0, 10.0]], 2, 1)
+
+
+def test_a_parameter_of_a_section_by_its_name():
+    section = PoincareSection(OSCILLATOR, lambda t, x: x[1])
+    one, two = (
+        section.sample([[-0.5, 1.0]] * 2, 3, 2, where=w, values=[2.6, 2.7])
+        for w in ("omega", lambda s: s.omega)
+    )
+    assert np.array_equal(one.times, two.times)

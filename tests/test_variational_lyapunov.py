@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from textbook_systems import parameters
 
 import jaxcam
@@ -245,3 +246,58 @@ def test_strong_contraction_is_resolved():
     exact = mean + 2 * count * np.log(0.8) / (t1 - t0)
     assert exact * turn < -80
     np.testing.assert_allclose(float(made.exponents.sum()), exact, atol=1e-5)
+
+
+def test_a_slow_impact_leaves_an_exponent_finite():
+    """An impact at the speed v stretches one direction by about 1/v and compresses the
+    other as much; the sum rule holds to 1e-9. The start is computed backwards from the
+    impact.
+    """
+    system = ImpactOscillator(
+        **parameters(omega=3.5, restitution=0.8, wall=-0.2, damping=0.02)
+    )
+    for speed in (1e-4, 1e-5):
+        back = solve_ivp(
+            lambda t, x: np.asarray(system.vector_field(t, jnp.array(x))),
+            [0.9, 0.0],
+            [-0.2, speed],
+            rtol=1e-12,
+            atol=1e-14,
+            max_step=0.05,
+        )
+        made = variational.lyapunov_spectrum(
+            system, back.y[:, -1], 4, transient=0, blocks=2
+        )
+        exact = -0.04 + 2 * np.log(0.8) * float(made.impact_rate)
+        np.testing.assert_allclose(made.exponents.sum(), exact, atol=1e-9)
+
+
+def test_xla_says_what_rounding_hides():
+    """Over a long period, it knows the first exponent only."""
+    made = variational.lyapunov_spectrum(
+        ReliefValve(flow=3.0),
+        [0.5, 0.0, 11.0],
+        4,
+        transient=1,
+        blocks=2,
+        turn=8.0,
+        settings=Settings(backend="xla"),
+    )
+    assert int(made.code) == 0
+    assert np.isfinite(made.exponents[0]) and np.isnan(made.exponents[2])
+
+
+def test_lists_and_what_else_does_not_fit():
+    system = _system(0.02)
+    made = variational.lyapunov_spectrum(
+        system, [-0.9, 0.0], 16, where="omega", values=[3.4, 3.5], transient=1
+    )
+    assert made.exponents.shape == (2, 2)
+    for wrong, match in (
+        (dict(transient=-1), "transient is -1"),
+        (dict(turn=0.0), "turn is 0"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            variational.lyapunov_spectrum(system, [-0.9, 0.0], 16, **wrong)
+    with pytest.raises(ValueError, match="no motions"):
+        variational.lyapunov_spectrum(system, np.zeros((0, 2)), 16)

@@ -16,10 +16,11 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.backend import Lacking, say_lacking
 from jaxcam.hybrid.batch import Horizon, Lanes
-from jaxcam.hybrid.checks import refuse_tracers
+from jaxcam.hybrid.checks import check_system, refuse_tracers
 from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
+from ._seen import Seen
 from ._tangent_loop import frames_of_periods
 from ._turn_frames import first_turn, next_turns
 
@@ -93,7 +94,9 @@ def lyapunov_spectrum(
         progress: Called with the fraction of periods completed.
 
     Returns:
-        A `LyapunovSpectrum`; exponents are minus infinity if the motion sticks.
+        A `LyapunovSpectrum`; exponents are minus infinity if the motion sticks. With
+            XLA, exponents are NaN if rounding hides the growth of a vector over a
+            period, relative to that of the others.
 
     Raises:
         ValueError: Shapes are inconsistent, there is no period, or a switching surface
@@ -111,7 +114,7 @@ def lyapunov_spectrum(
     refuse_tracers("lyapunov_spectrum", "jax.jacfwd of jaxcam.hybrid.flow", *inputs)
     settings = Settings(tolerance=1e-12) if settings is None else settings
     settings.check()
-    _check(system, turns, turn, blocks, (where is None) == (values is None))
+    _check(system, turns, transient, turn, blocks, (where is None) == (values is None))
     system = as_arrays(system)
     settings = as_arrays(settings)
     state = real_array(state)
@@ -121,45 +124,65 @@ def lyapunov_spectrum(
     begin = jnp.asarray(float(t0))
     returned = _restitutions(batched, shared, begin, states)
     check_restitution(system, returned[0] if single else returned)
+    _check_system(batched, shared, begin, states, settings)
     told = (lambda _: None) if progress is None else progress
+
+    def summary(seen, status, batched):
+        return _summary(seen, status, _turn(batched, shared, length), transient, blocks)
+
+    made = None
     if settings.compiles:
         chosen = None if where is None else pick(where, system)
-        lanes = Lanes(system, chosen, values, np.asarray(states))
+        given = None if values is None else np.asarray(values, dtype=float)
+        lanes = Lanes(system, chosen, given, np.asarray(states))
         when = Horizon(begin, length, transient + turns)
         try:
-            found = frames_of_periods(lanes, when, settings, max_steps, told)
-            turns_of_lanes = _turn(batched, shared, length)
-            made = _summary(
-                _Seen.of(*found), found[3], turns_of_lanes, transient, blocks
-            )
-            return jax.tree.map(lambda leaf: leaf[0], made) if single else made
+            *found, code = frames_of_periods(lanes, when, settings, max_steps, told)
+            made = summary(Seen.of(*found), code, batched)
         except Lacking as lacking:
             say_lacking(lacking, settings.demands)
-    _refuse_hysteresis(system)
+    if made is None:
+        _refuse_hysteresis(system)
+        given = shared, length, begin, settings, max_steps
+        made = _by_xla(batched, states, given, transient + turns, told, summary)
+    return jax.tree.map(lambda leaf: leaf[0], made) if single else made
 
+
+def _by_xla(batched, states, given, turns: int, told: Callable, summary: Callable):
+    """Differentiate the flow over each period."""
     done = 0.0
 
     def some(batched, states):
         nonlocal done
-        seen = _Seen(states.shape[0], transient + turns + 1, states.shape[1])
+        seen = Seen(states.shape[0], turns + 1, states.shape[1])
 
         def report():
             told(done + seen.share * states.shape[0] / padded)
 
-        given = batched, shared, length, begin, settings, max_steps
-        status = _by_turns(states, *given, seen, report)
+        status = _by_turns(states, batched, *given, seen=seen, report=report)
         done += states.shape[0] / padded
-        return _summary(seen, status, _turn(batched, shared, length), transient, blocks)
+        return summary(seen, status, batched)
 
     padded = _padded(states.shape[0])
-    made = _in_turn(some, batched, states)
-    return jax.tree.map(lambda leaf: leaf[0], made) if single else made
+    return _in_turn(some, batched, states)
 
 
-def _check(system, turns: int, turn: float | None, blocks: int, paired: bool) -> None:
+def _check_system(batched, shared, t0, states, settings) -> None:
+    """Raise `ValueError` for the system of the first motion."""
+    if not len(states):
+        raise ValueError("there are no motions; give at least one state")
+    first = eqx.combine(jax.tree.map(lambda leaf: leaf[0], batched), shared)
+    check_system(first, t0, states[0], settings)
+
+
+def _check(system, turns: int, transient: int, turn, blocks: int, paired: bool) -> None:
     """Raise `ValueError` if the arguments do not fit together."""
     if turn is None and system.period is None:
         raise ValueError("this system has no forcing period; pass turn=... in seconds")
+    if turn is not None and not turn > 0:
+        raise ValueError(f"turn is {turn:g}; give a positive length of a period (s)")
+    if transient < 0:
+        raise ValueError(f"transient is {transient}; give 0 or more periods")
     if not 2 <= blocks <= turns:
         raise ValueError(
             f"{turns} periods cannot be divided into {blocks} blocks; give at least "
@@ -177,7 +200,7 @@ def _refuse_hysteresis(system) -> None:
         raise ValueError(
             "lyapunov_spectrum supports hysteresis only with the LLVM backend, because "
             "XLA differentiates period by period, and the state at the start of a "
-            "period does not determine the side; omit Settings(backend=...), or "
+            'period does not determine the side; use Settings(backend="llvm"), or '
             "differentiate jaxcam.hybrid.flow over the whole motion with jax.jacfwd"
         )
 
@@ -224,51 +247,7 @@ def _in_turn(some: Callable, batched, states):
     return eqx.tree_at(lambda m: m.turn, whole, parts[0].turn) if alike else whole
 
 
-class _Seen:
-    """Sums of the logarithms and numbers of impacts at the end of each period."""
-
-    def __init__(self, lanes: int, stops: int, n: int):
-        self.logs = np.full((lanes, stops, n), np.nan)
-        self.hits = np.full((lanes, stops), np.nan)
-        self.states = np.full((lanes, n), np.nan)
-        self.logs[:, 0], self.hits[:, 0] = 0.0, 0.0
-        self._filled = np.ones(lanes, dtype=int)
-
-    @staticmethod
-    def of(logs, hits, states, code) -> "_Seen":
-        """Return values at the ends of all periods, as a whole."""
-        del code
-        lanes, stops, n = logs.shape
-        seen = _Seen(lanes, stops + 1, n)
-        seen.logs[:, 1:], seen.hits[:, 1:] = logs, hits
-        # the last one that was reached
-        reached = np.isfinite(hits).sum(axis=1) - 1
-        seen.states[:] = states[np.arange(lanes), reached]
-        return seen
-
-    @property
-    def share(self) -> float:
-        """Return the fraction of periods completed, over all motions."""
-        # the first is the start of the run
-        done, most = self._filled - 1, self.logs.shape[1] - 1
-        return float(np.mean(np.minimum(done, most))) / most
-
-    @property
-    def complete(self) -> bool:
-        """Return whether every period is filled."""
-        return bool(np.all(self._filled >= self.logs.shape[1]))
-
-    def take_turns(self, logs, hits, after) -> None:
-        """Add values at the ends of the next periods, `(motions, turns, ...)`."""
-        first = int(self._filled[0])
-        count = min(logs.shape[1], self.logs.shape[1] - first)
-        self.logs[:, first : first + count] = logs[:, :count]
-        self.hits[:, first : first + count] = hits[:, :count]
-        self.states[:] = after[:, count - 1]
-        self._filled += count
-
-
-def _summary(seen: _Seen, status, length, transient, blocks):
+def _summary(seen: Seen, status, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
         # the difference of two infinities: the motion stuck before and during this
@@ -282,10 +261,15 @@ def _summary(seen: _Seen, status, length, transient, blocks):
     with np.errstate(invalid="ignore"):
         error = means.std(axis=1, ddof=1) / np.sqrt(blocks)
     error = np.where(np.isneginf(local).any(axis=1), 0.0, error)
+    # the order of the vectors need not be that of their growth, if some vanish
+    mean = local.mean(axis=1)
+    order = np.argsort(-np.nan_to_num(mean, nan=-np.inf), axis=1, kind="stable")
+    mean, error = (np.take_along_axis(a, order, axis=1) for a in (mean, error))
+    local = np.take_along_axis(local, order[:, None], axis=2)
     impacts = seen.hits[:, -1] - seen.hits[:, transient]
     status = np.asarray(status).astype(int)
     return LyapunovSpectrum(
-        exponents=jnp.asarray(local.mean(axis=1)),
+        exponents=jnp.asarray(mean),
         stderr=jnp.asarray(error),
         impact_rate=jnp.asarray(impacts / (turns * length)),
         local=jnp.asarray(local),
@@ -317,8 +301,7 @@ def _lanes(system, state, where, values):
     return batched, shared, state
 
 
-# number of motions in one program, so that their logs fit into the cache and waiting
-# times are short
+# number of motions in one program, so that waiting times are short
 _BLOCK = 128
 
 

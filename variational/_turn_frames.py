@@ -10,6 +10,8 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid import flow
 
 
+# growth over a period, relative to that of other vectors, that rounding hides
+_HIDDEN = 1e-12
 # periods between two checks from Python
 TURNS = 16
 
@@ -58,7 +60,12 @@ def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnF
                 return made.state, made
 
             matrix, made = jax.jacfwd(end, has_aux=True)(carry.state)
-            frame, growth = orthonormal(elementwise_product(matrix, carry.frame))
+            columns = elementwise_product(matrix, carry.frame)
+            frame, growth = orthonormal(columns)
+            # what is left of a column after the projection may be rounding
+            before = jnp.sqrt(jnp.sum(columns * columns, axis=0))
+            hidden = (growth > 0) & (growth < _HIDDEN * before)
+            growth = jnp.where(hidden, jnp.nan, growth)
             after = TurnFrame(
                 made.state,
                 frame,

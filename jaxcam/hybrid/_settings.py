@@ -86,7 +86,7 @@ class Settings(eqx.Module):
 
     @property
     def demands(self) -> bool:
-        """Return whether a run that LLVM cannot compile is an error."""
+        """Return whether it is an error if LLVM cannot compile a run."""
         return self.backend in ("llvm", "cuda")
 
     @property
@@ -103,6 +103,11 @@ class Settings(eqx.Module):
         if self.backend not in ("auto", "llvm", "xla", "cuda"):
             raise ValueError(
                 f'backend is {self.backend!r}; choose "auto", "llvm", "xla" or "cuda"'
+            )
+        if self.plain and self.demands:
+            raise ValueError(
+                f"plain=True runs with XLA, but backend is {self.backend!r}; omit one "
+                "of them"
             )
         if not 0 < float(self.tolerance) < 1:
             raise ValueError(

@@ -128,7 +128,17 @@ class _WithSectionAndFriction(WithSection):
 def with_section(
     system: HybridSystem, function: Callable, direction: int, n: int
 ) -> WithSection:
-    """Return a system of `n` state components with a Poincaré section."""
+    """Return a system of `n` state components with a Poincaré section.
+
+    **Raises:** `ValueError` if the function does not return a scalar.
+    """
     kind = _WithSectionAndFriction if has_friction(system) else WithSection
-    shapes = jax.eval_shape(lambda x: surfaces(system, jnp.zeros(()), x), jnp.zeros(n))
+    time, state = jnp.zeros(()), jnp.zeros(n)
+    value = jax.eval_shape(lambda t, x: jnp.asarray(function(t, x)), time, state)
+    if value.shape != ():
+        raise ValueError(
+            f"the function of the section returns shape {value.shape}; return one "
+            "number"
+        )
+    shapes = jax.eval_shape(lambda t, x: surfaces(system, t, x), time, state)
     return kind(system, function, direction, shapes.shape[0])

@@ -13,7 +13,7 @@ from ._ptx import needed, ptx_of
 from ._writer import compiled_or_lacking, Lacking
 
 
-# threads that share a scheduler; few, because each needs most of the registers
+# threads of a block; few, because each thread needs most of the registers it can have
 _BLOCK = 64
 # rounds per launch; between launches, Python can be interrupted
 _PATIENCE = 20_000
@@ -88,7 +88,7 @@ class CudaAttempts:
         each = cupy.cuda.driver.occupancyMaxActiveBlocksPerMultiprocessor(
             self.kernel.kernel.ptr, _BLOCK, 0
         )
-        return each * cupy.cuda.Device().attributes["MultiProcessorCount"]
+        return max(1, each * cupy.cuda.Device().attributes["MultiProcessorCount"])
 
 
 _KNOWN = Cache()
@@ -99,8 +99,9 @@ def cuda_attempts_of(key: Key) -> CudaAttempts:
 
     **Raises:** `Lacking`; `ValueError` if there is no GPU or no CuPy.
     """
-    _cupy()
-    return compiled_or_lacking(_KNOWN, key, lambda: CudaAttempts(key))
+    # a kernel belongs to the GPU for which it was loaded
+    one = key, _cupy().cuda.Device().id
+    return compiled_or_lacking(_KNOWN, one, lambda: CudaAttempts(key))
 
 
 def _cupy() -> Any:
@@ -121,9 +122,12 @@ def _cupy() -> Any:
 
 def _libdevice() -> bytes:
     """Return the code of libdevice, NVIDIA's library of mathematical functions."""
-    from cuda import pathfinder  # pyright: ignore
-
     try:
+        from cuda import pathfinder  # pyright: ignore
+
         return Path(pathfinder.find_bitcode_lib("device")).read_bytes()
     except Exception as error:
-        raise Lacking(f"libdevice, which is not installed ({error})") from error
+        raise Lacking(
+            "mathematical functions on the GPU without libdevice (pip install "
+            "nvidia-nvvm provides it)"
+        ) from error

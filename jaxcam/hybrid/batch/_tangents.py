@@ -15,7 +15,7 @@ from ._table import Table
 
 # a tangent vector that shrinks to this fraction in one attempt has vanished: what is
 # left of it is rounding
-_GONE = 1e-10
+_GONE = 1e-14
 # batch elements at a time, for the start
 _WIDTH = 128
 

@@ -187,7 +187,7 @@ def first_state(
         crossed=(-jnp.inf * one,) if functions.k else (),
         points=() if functions.counts is None else (0.0 * one,),
         stale=(jnp.where(slides, 2.0, jnp.where(held, 1.0, 0.0)),)
-        if functions.slidable
+        if functions.slidable or functions.counts is not None
         else (),
         origin=origin,
         extents=extents,

@@ -30,7 +30,8 @@ def kind_of_switch(carried, landing: Landing, lands, kind):
 def at_section(functions, carried, landing: Landing, lands) -> tuple:
     """Return whether an attempt ends at the Poincaré section, if there is one.
 
-    A jump of the state across the section is not a crossing.
+    A crossing in no time is not one of the flow: a jump of the state has crossed the
+    section, or a contact that held the motion on it has ended.
     """
     if functions.counts is None:
         return ()
@@ -38,4 +39,4 @@ def at_section(functions, carried, landing: Landing, lands) -> tuple:
     if functions.counts:
         rises = carried.negative[-1]
         crosses = crosses & (rises if functions.counts > 0 else ~rises)
-    return (crosses & ~carried.behind[-1],)
+    return (crosses & (landing.t > carried.t),)

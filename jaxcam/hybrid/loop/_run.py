@@ -74,7 +74,7 @@ def run_raw(
     # time
     alone = company == "one"
     keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
-    width = len(row(_empty_record(functions.n, len(carried.mode)), carried))
+    width = len(row(_empty_record(carried), carried))
     blocks = -(-rows // _BLOCK)
 
     def unfinished(carry):
@@ -131,7 +131,7 @@ def run_many(some: Callable, lanes: LoopState, rows: int, row):
     # the log is written in its final layout, because under `vmap` each write would move
     # all of it
     blocks, width = -(-rows // _BLOCK), len(lanes.status)
-    parts = row(_empty_record(len(lanes.x), len(lanes.mode)), lanes)
+    parts = row(_empty_record(lanes), lanes)
     log = [jnp.zeros((blocks * _BLOCK, width)) for _ in parts]
 
     def unfinished(carry):
@@ -178,10 +178,11 @@ def run_reversible(
     return carried, log_of(log, functions.n)
 
 
-def _empty_record(n: int, flags: int) -> Record:
+def _empty_record(state: LoopState) -> Record:
     zero = 0.0
-    state = (zero,) * n
-    return Record(zero, zero, zero, state, state, (zero,) * flags, ())
+    x, flags = (zero,) * len(state.x), (zero,) * len(state.mode)
+    points = tuple(jnp.asarray(False) for _ in state.points)
+    return Record(zero, zero, zero, x, x, flags, points)
 
 
 def _row(record: Record, _: LoopState) -> list:

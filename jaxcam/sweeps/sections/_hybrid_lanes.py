@@ -18,6 +18,7 @@ from ...hybrid.batch import (
     split_lanes,
     Table,
 )
+from ...hybrid.checks import check_system
 from ...hybrid.loop import starts_behind
 from ...hybrid.sizes import component_sizes
 from ...hybrid.surface import contact_state, gaps, least_gaps
@@ -27,6 +28,17 @@ from ._samples import BEHIND
 
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
 """Numbers of motions that advance together, for upper limits of the total number."""
+
+
+def _check_first(section, settings, state, where, value) -> None:
+    """Raise `ValueError` for the system of the first motion."""
+    system = as_arrays(section.system)
+    if where is not None:
+        several = isinstance(where(system), tuple)
+        parts = tuple(map(jnp.asarray, value)) if several else jnp.asarray(value)
+        system = eqx.tree_at(where, system, parts)
+    start = jnp.asarray(section.t0, dtype=jnp.float64), jnp.asarray(state)
+    check_system(system, *start, as_arrays(settings))
 
 
 class Rows(NamedTuple):
@@ -178,6 +190,11 @@ def run_tables(section, rows: "Rows", states, turns, where, values, watched=None
         The table, `(motions, places, columns)`; impacts and codes of the motions.
     """
     rows.settings.check()
+    # states its error if there is no period
+    section.turn(where, values)
+    if len(states):
+        value = None if values is None else np.asarray(values, dtype=float)[0]
+        _check_first(section, rows.settings, states[0], where, value)
     system, chosen = (section.system, where) if watched is None else watched
     system, settings = as_arrays(system), as_arrays(rows.settings)
     period = section.period

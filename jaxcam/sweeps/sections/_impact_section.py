@@ -8,6 +8,7 @@ import numpy as np
 
 from ...hybrid import HybridSystem, Settings
 from ...hybrid.codes import RowKind
+from ...parameters import pick
 from ._hybrid_lanes import Rows, run_tables
 from ._samples import Samples
 from ._system_section import AbstractSystemSection
@@ -47,6 +48,7 @@ class ImpactSection(AbstractSystemSection):
 
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)
+        where = None if where is None else pick(where, self.system)
         n = states.shape[1]
         settings = self.settings
         if settings is None:

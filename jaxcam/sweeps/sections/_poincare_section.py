@@ -10,6 +10,7 @@ import numpy as np
 from ...hybrid import HybridSystem, Settings
 from ...hybrid.codes import RowKind
 from ...hybrid.sections import with_section
+from ...parameters import pick
 from ._hybrid_lanes import Rows, run_tables
 from ._samples import Samples
 from ._system_section import AbstractSystemSection
@@ -18,7 +19,9 @@ from ._system_section import AbstractSystemSection
 class PoincareSection(AbstractSystemSection):
     """Poincaré section: crossings of `function(t, state) = 0`, with their times.
 
-    A jump of the state across the section, by an impact, is not a crossing.
+    A jump of the state across the section, by an impact, is not a crossing, nor is the
+    end of a contact that held the motion on it. For points at a constraint, use
+    [`jaxcam.sweeps.ImpactSection`][].
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
@@ -50,6 +53,7 @@ class PoincareSection(AbstractSystemSection):
 
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)
+        where = None if where is None else pick(where, self.system)
         lanes, n = states.shape
         if self.direction not in (-1, 0, 1):
             raise ValueError(
