@@ -62,8 +62,8 @@ def _at_end(record, lane):
     return place, [lane.points[0]]
 
 
-def counted(flows, duration: float, backend: str) -> np.ndarray:
-    """Return the number of returns of each motion."""
+def counted(flows, duration: float, backend: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of returns and of attempted steps of each motion."""
     settings = as_arrays(Settings(tolerance=1e-10, chatter_depth=1.0, backend=backend))
     system = as_arrays(with_section(ReliefValve(), _rate_falls, -1, 3))
     lanes = Lanes(
@@ -71,8 +71,10 @@ def counted(flows, duration: float, backend: str) -> np.ndarray:
     )
     table = Table(_at_end, len(flows), 1, 1)
     when = Horizon(jnp.zeros(()), jnp.asarray(duration), 1)
-    run_refilled(lanes, when, settings, Chunking(128, 64, 1_000_000), table)
-    return table.numbers[:, 0, 0]
+    _, steps, _ = run_refilled(
+        lanes, when, settings, Chunking(128, 64, 1_000_000), table
+    )
+    return table.numbers[:, 0, 0], steps
 
 
 def main(
@@ -90,10 +92,12 @@ def main(
     samples = returns(values, duration, backend)
     first = time.perf_counter() - begun
     done = samples.code == 0
-    total = int(np.nansum(counted(values, duration, backend)))
+    count, steps = counted(values, duration, backend)
+    total = int(np.nansum(count))
     print(
         f"relief valve: {flows} flows, {total / max(1, done.sum()):.0f} returns each, "
-        f"{np.count_nonzero(~done)} failed; first call {first:.1f} s"
+        f"{np.count_nonzero(~done)} failed; {steps.sum() / total:.0f} attempted steps "
+        f"a return; first call {first:.1f} s"
     )
     best = np.inf
     for _ in range(repeats):

@@ -1,6 +1,7 @@
 """Batches on a GPU: the code for it, run thread by thread on the CPU; and its PTX."""
 
 import ctypes
+import importlib.util
 import pathlib
 import re
 import types
@@ -58,7 +59,7 @@ class _Emulated:
             self.function(*numbers)
 
 
-def _stub(monkeypatch):
+def _emulate(monkeypatch):
     """Let the backend find a GPU that is emulated on the CPU."""
 
     def module(path):
@@ -104,7 +105,7 @@ def test_threads_that_share_a_queue(monkeypatch, name):
     """Samples, impacts and attempts of six threads: those of the vector loop, to
     1e-9.
     """
-    _stub(monkeypatch)
+    _emulate(monkeypatch)
     system, states = _CASES[name]
     if isinstance(system, ImpactOscillator):
         values = np.linspace(2.4, 2.9, len(states))
@@ -123,7 +124,7 @@ def test_threads_that_share_a_queue(monkeypatch, name):
 
 
 def test_a_limit_of_attempts(monkeypatch):
-    _stub(monkeypatch)
+    _emulate(monkeypatch)
     made = stroboscope(
         ImpactOscillator(), [[0.0, 1.0]] * 9, 50, settings=_GPU, max_steps=20
     )
@@ -141,7 +142,7 @@ def test_a_limit_of_attempts(monkeypatch):
 def test_ptx(monkeypatch, system, start):
     """The code compiles to PTX: one kernel, without functions of other libraries."""
     texts = []
-    _stub(monkeypatch)
+    _emulate(monkeypatch)
     monkeypatch.setattr(_cuda, "ptx_of", lambda text, *_: texts.append(text) or text)
     stroboscope(system, [start], 1, settings=_GPU, period=0.01)
     code = _ptx.ptx_of(texts[0], "sm_80")
@@ -166,13 +167,10 @@ define ptx_kernel void @"run"(ptr %p) {
 
 
 def test_without_cupy():
-    try:
-        import cupy  # noqa: F401  # pyright: ignore
-    except ImportError:
-        with pytest.raises(ValueError, match=r"pip install \"jaxcam\[cuda\]\""):
-            stroboscope(ImpactOscillator(), [0.0, 1.0], 2, settings=_GPU)
-    else:
+    if importlib.util.find_spec("cupy") is not None:
         pytest.skip("CuPy is installed")
+    with pytest.raises(ValueError, match=r"pip install \"jaxcam\[cuda\]\""):
+        stroboscope(ImpactOscillator(), [0.0, 1.0], 2, settings=_GPU)
 
 
 def test_one_trajectory_runs_on_the_cpu():

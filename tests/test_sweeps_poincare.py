@@ -57,7 +57,7 @@ _SECTIONS = {
 @pytest.mark.parametrize("direction", [1, -1, 0])
 @pytest.mark.parametrize("name", _SECTIONS)
 def test_a_batch_of_sections_is_that_of_trajectories(name, direction):
-    """Times and states of the last points to 1e-8, impacts and completed chatters
+    """Times and states of the last points to 1e-8, impacts and contacts that begin
     between them; the trajectory locates them by bisection.
     """
     system, function, states, length = _SECTIONS[name]
@@ -78,6 +78,9 @@ def test_a_batch_of_sections_is_that_of_trajectories(name, direction):
         edges = np.concatenate([[0.0], times])
         hits = np.histogram(np.asarray(run.impacts.time), edges)[0][-number:]
         assert np.array_equal(samples.hits[k, -number:], hits)
+        begun = np.asarray(run.contacts.start)
+        rests = np.histogram(begun[begun > 0], edges)[0][-number:]
+        assert np.array_equal(samples.rests[k, -number:], rests)
         assert np.abs(samples.final[k] - np.asarray(run.final)).max() < 1e-8
     assert found > 0 or (name, direction) == ("spinning ball", 1)
 
