@@ -1,6 +1,7 @@
 """Run the loop of attempts on an NVIDIA GPU, with one thread for each batch element."""
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ class CudaAttempts:
         *,
         first: float = 0.0,
         limit: float,
+        between: Callable[[], None] | None = None,
     ) -> None:
         """Run batch elements to the end, or to `limit` attempts each.
 
@@ -80,6 +82,8 @@ class CudaAttempts:
             self.kernel((blocks,), (_BLOCK,), arguments)
             if not int(counters[UNFINISHED]):
                 break
+            if between is not None:
+                between()
         lanes[...], table[...] = cupy.asnumpy(states), cupy.asnumpy(log)
 
     def _resident(self) -> int:

@@ -1,5 +1,6 @@
 """Run many batch elements in fewer positions, which are refilled when one ends."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from ..backend import (
     vector_width,
 )
 from ..codes import FINISHED, RUNNING
+from ..loop import iteration
 from ..lowering import pack
 from ._layout import compiled_chunk, Horizon, Lanes, LaneStart, start_lanes
 from ._table import Table
@@ -47,28 +49,46 @@ def run_refilled(
     start = start_lanes(lanes, horizon, settings, chunking.width)
     if settings.compiles:
         try:
-            return _by_llvm(start, chunking.max_steps, table, settings.on_gpu)
+            return run_compiled(
+                start, chunking.max_steps, table, on_gpu=settings.on_gpu
+            )
         except Lacking as lacking:
             say_lacking(lacking, settings.demands)
     return _by_xla(start, chunking, table)
 
 
-def _by_llvm(start: LaneStart, max_steps: int, table: Table, on_gpu: bool):
-    """Run the loop as LLVM code, which replaces ended batch elements itself."""
+def run_compiled(
+    start: LaneStart,
+    max_steps: int,
+    table: Table,
+    *,
+    on_gpu: bool = False,
+    step: Callable = iteration,
+    between: Callable[[], None] | None = None,
+):
+    """Run the loop as LLVM code, which replaces ended batch elements itself.
+
+    `step` takes one attempted step; `between` is called now and then.
+
+    **Raises:** `Lacking` if the backend lacks an operation.
+    """
     count = start.numbers.shape[1]
     shared, shared_layout = laid_out(start.shared)
     own, own_layout = laid_out(start.own, count)
     numbers = np.ascontiguousarray(start.numbers.T)
-    key = key_of(
-        start.static,
-        own_layout,
-        shared_layout,
-        start.slots.example(),
-        table.row,
-        1 if on_gpu else vector_width(),
-    )
+    layouts = own_layout, shared_layout, start.slots.example()
+    width = 1 if on_gpu else vector_width()
+    key = key_of(start.static, *layouts, table.row, width, step)
     loop = cuda_attempts_of(key) if on_gpu else attempts_of(key)
-    loop.run(shared, own, numbers, table.numbers, first=table.first, limit=max_steps)
+    loop.run(
+        shared,
+        own,
+        numbers,
+        table.numbers,
+        first=table.first,
+        limit=max_steps,
+        between=between,
+    )
     place = start.slots.rows
     columns = [place.impacts, place.steps, place.status]
     return tuple(numbers[:, columns].astype(int).T)

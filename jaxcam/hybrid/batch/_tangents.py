@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from ..backend import attempts_of, key_of, laid_out, Rowwise, vector_width
+from ..backend import Rowwise
 from ..loop import first_state, Functions, iteration, Jet, LoopState, Plan
 from ._layout import Horizon, Lanes, start_lanes
+from ._refilled_lanes import run_compiled
 from ._table import Table
 
 
@@ -191,21 +191,6 @@ def run_tangents(
     **Raises:** `Lacking` if the LLVM backend lacks an operation.
     """
     start = start_lanes(lanes, horizon, settings, _WIDTH, _FIRST)
-    count = start.numbers.shape[1]
-    shared, shared_layout = laid_out(start.shared)
-    own, own_layout = laid_out(start.own, count)
-    numbers = np.ascontiguousarray(start.numbers.T)
-    layouts = own_layout, shared_layout, start.slots.example()
-    key = key_of(start.static, *layouts, table.row, vector_width(), tangent_iteration)
-    attempts_of(key).run(
-        shared,
-        own,
-        numbers,
-        table.numbers,
-        first=table.first,
-        limit=max_steps,
-        between=between,
+    return run_compiled(
+        start, max_steps, table, step=tangent_iteration, between=between
     )
-    place = start.slots.rows
-    columns = [place.impacts, place.steps, place.status]
-    return tuple(numbers[:, columns].astype(int).T)

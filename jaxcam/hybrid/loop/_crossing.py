@@ -8,7 +8,7 @@ from ._flight import moves_in, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._loop_state import LoopState
-from ._select import any_of, select
+from ._select import select
 from ._step import Step
 
 
@@ -51,15 +51,6 @@ def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h):
             offset=jnp.where(now, 0.0, seen.offset),
         )
     return verdicts
-
-
-def rests_on_section(carried: LoopState, jets, slack):
-    """Return whether a contact holds the motion on the Poincaré section, which it then
-    does not cross.
-    """
-    ends = carried.jets[-1].gap, jets[-1].gap
-    on = [jnp.abs(gap) <= slack[-1] for gap in ends]
-    return any_of(carried.contact) & on[0] & on[1]
 
 
 def sides_after(
@@ -112,13 +103,12 @@ def past_surfaces(
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
         on = hit[m + k] & ~left & (jnp.abs(jet.gap) <= near)
         back = on & moves_in(jet._replace(gap=jnp.where(on, 0.0, jet.gap)), blur[m + k])
-        if functions.counts is not None and k + 1 == functions.k:
-            # a Poincaré section cannot stop a motion
-            back = back & False
         gap = jnp.where(on | left, 0.0, jet.gap)
         if k not in functions.slidable:
             slides.append(jnp.asarray(False))
-            stuck = stuck | back
+            # a Poincaré section cannot stop a motion
+            if functions.counts is None or k + 1 < functions.k:
+                stuck = stuck | back
             jets[m + k] = jet._replace(gap=gap)
             continue
         most = -approach * slack[k] / (1 + slack[k])

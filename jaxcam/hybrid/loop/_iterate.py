@@ -14,12 +14,7 @@ import jax.numpy as jnp
 from ..breakpoints import after
 from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
-from ._crossing import (
-    jumped_across,
-    of_constraints,
-    refreshed,
-    rests_on_section,
-)
+from ._crossing import jumped_across, of_constraints, refreshed
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
@@ -195,8 +190,6 @@ def _judge_flights(
         # over the short rest of a chatter, whose contact may change the end of sliding
         m = len(carried.held)
         free[m:] = [f & ~carried.completing for f in free[m:]]
-    if functions.counts is not None:
-        free[-1] = free[-1] & ~rests_on_section(carried, jets, slack)
     verdicts = [
         _where_in_force(
             free[k],

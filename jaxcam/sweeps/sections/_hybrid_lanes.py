@@ -30,17 +30,6 @@ _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
 """Numbers of motions that advance together, for upper limits of the total number."""
 
 
-def _check_first(section, settings, state, where, value) -> None:
-    """Raise `ValueError` for the system of the first motion."""
-    system = as_arrays(section.system)
-    if where is not None:
-        several = isinstance(where(system), tuple)
-        parts = tuple(map(jnp.asarray, value)) if several else jnp.asarray(value)
-        system = eqx.tree_at(where, system, parts)
-    start = jnp.asarray(section.t0, dtype=jnp.float64), jnp.asarray(state)
-    check_system(system, *start, as_arrays(settings))
-
-
 class Rows(NamedTuple):
     """The rows of the logs that a section stores: see `Table`."""
 
@@ -192,9 +181,7 @@ def run_tables(section, rows: "Rows", states, turns, where, values, watched=None
     rows.settings.check()
     # states its error if there is no period
     section.turn(where, values)
-    if len(states):
-        value = None if values is None else np.asarray(values, dtype=float)[0]
-        _check_first(section, rows.settings, states[0], where, value)
+    _check_first(section, rows.settings, states, where, values)
     system, chosen = (section.system, where) if watched is None else watched
     system, settings = as_arrays(system), as_arrays(rows.settings)
     period = section.period
@@ -212,6 +199,18 @@ def run_tables(section, rows: "Rows", states, turns, where, values, watched=None
     tails = (rows.places, rows.columns), ()
     numbers, impacts, code = run_lanes(run, *parts, tails)
     return numbers, np.nan_to_num(impacts).astype(int), code
+
+
+def _check_first(section, settings, states, where, values) -> None:
+    """Raise `ValueError` for the system of the first motion with a finite state."""
+    finite = np.flatnonzero(np.isfinite(states).all(axis=1))
+    if not len(finite):
+        return
+    lane = int(finite[0])
+    batched, shared = split_lanes(as_arrays(section.system), where, values)
+    first = eqx.combine(jax.tree.map(lambda leaf: leaf[lane], batched), shared)
+    start = jnp.asarray(section.t0, dtype=jnp.float64), jnp.asarray(states[lane])
+    check_system(first, *start, as_arrays(settings))
 
 
 def _rows(states):
