@@ -145,6 +145,15 @@ class SwitchedSystem(HybridSystem):
         """
         return "kinematic"
 
+    @property
+    def has_contact_friction(self) -> bool:
+        """Return whether the contacts have friction: whether the class defines
+        `contact_friction`.
+
+        Override it in a class that passes on the method of another system.
+        """
+        return type(self).contact_friction is not SwitchedSystem.contact_friction
+
     def contact_friction(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]
     ) -> Float[Array, "*constraints n"]:

@@ -70,6 +70,17 @@ class WithSection(SwitchedSystem):
         return self._each("holding", 1.0)
 
     @property
+    def has_contact_friction(self) -> bool:
+        """Return whether the contacts of the system have friction."""
+        return has_friction(self.system)
+
+    def contact_friction(self, t, state, sides):
+        """Return the friction of each contact of the system."""
+        if isinstance(self.system, SwitchedSystem):
+            return self.system.contact_friction(t, state, sides[:-1])
+        return super().contact_friction(t, state, sides)
+
+    @property
     def restitution_kind(self):
         """Return the kind of the coefficient of restitution of the system."""
         if isinstance(self.system, SwitchedSystem):
@@ -116,15 +127,6 @@ class WithSection(SwitchedSystem):
         return jnp.append(jnp.broadcast_to(own, (self.number,)), of_section)
 
 
-class _WithSectionAndFriction(WithSection):
-    """A system with friction in its contacts, and a Poincaré section."""
-
-    def contact_friction(self, t, state, sides):
-        """Return the friction of each contact of the system."""
-        assert isinstance(self.system, SwitchedSystem)
-        return self.system.contact_friction(t, state, sides[:-1])
-
-
 def with_section(
     system: HybridSystem, function: Callable, direction: int, n: int
 ) -> WithSection:
@@ -132,7 +134,6 @@ def with_section(
 
     **Raises:** `ValueError` if the function does not return a scalar.
     """
-    kind = _WithSectionAndFriction if has_friction(system) else WithSection
     time, state = jnp.zeros(()), jnp.zeros(n)
     value = jax.eval_shape(lambda t, x: jnp.asarray(function(t, x)), time, state)
     if value.shape != ():
@@ -141,4 +142,4 @@ def with_section(
             "number"
         )
     shapes = jax.eval_shape(lambda t, x: surfaces(system, t, x), time, state)
-    return kind(system, function, direction, shapes.shape[0])
+    return WithSection(system, function, direction, shapes.shape[0])

@@ -9,7 +9,14 @@ from ...hybrid import HybridSystem
 from ...tables import ShortTable
 from ..evidence import Differing, Ripple, Structure
 from ..policy import Policy
-from ..terms import FreeFunction, Value, Where, WithHidden, WithTerms
+from ..terms import (
+    FreeFunction,
+    system_with_element,
+    system_with_terms,
+    Value,
+    Where,
+    WithTerms,
+)
 from ._caveats import Caveat
 from ._missing import MissingFunction
 from ._words import number, spelled
@@ -224,10 +231,10 @@ class Diagnosis:
         if drive is not None:
             system = model.uniform(0.0, drive.speed)
         base, pairs = system.base, system.coordinates  # pyright: ignore
-        whole = WithTerms(base, tuple(terms), pairs) if terms else base
+        whole = system_with_terms(base, terms, pairs) if terms else base
         for one in self.missing:
             if one.element is not None:
-                whole = WithHidden(whole, one.element, pairs[0])
+                whole = system_with_element(whole, one.element, pairs[0])
         return whole
 
     @property

@@ -29,7 +29,7 @@ from ...fitting.engine import (
     runge_kutta,
 )
 from ...parameters import FloatScalar
-from ..terms import Motion, Term, WithTerms
+from ..terms import Motion, system_with_terms, Term
 from ._blocks import Blocks
 
 
@@ -239,7 +239,7 @@ def _linear(
         def model_at(change, start, step):
             model = near.at(change[:size])
             force = LocalForce(change[size:], start, stride * step / 2)
-            system = WithTerms(
+            system = system_with_terms(
                 model.system.base,
                 (*model.system.terms, force),
                 model.system.coordinates,

@@ -7,7 +7,7 @@ from ...fitting import Input, Model, Parameter, Turning
 from ...recordings import Recording, References, Segments
 from ...recordings.cut import fast_speed
 from ...recordings.files import unit_of
-from ..terms import coordinates, library, Term, WithTerms
+from ..terms import coordinates, library, system_with_terms, Term
 from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
 
@@ -68,5 +68,5 @@ def with_terms(
     placed = measured_in(unit_of(seen), scaled)
     drive: Turning | Input | None = of_base(model.drive)
     more = [p for k, term in enumerate(placed) for p in term.parameters(k)]
-    system = WithTerms(model.system, placed, pairs)
+    system = system_with_terms(model.system, placed, pairs)
     return Model(system, sensors, drive), [*map(within, parameters), *more]

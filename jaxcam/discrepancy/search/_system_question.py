@@ -20,7 +20,7 @@ from ...recordings.cut import (
 )
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
-from ..terms import coordinates, library, Term, terms_of, watched, WithTerms
+from ..terms import coordinates, library, system_with_terms, Term, terms_of, watched
 from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
 from ._question import (
@@ -119,7 +119,7 @@ def system_question(
 
     terms, unlisted = listed(references)
     model = watched(
-        Model(WithTerms(system, terms, pairs), dict(sensors), of_base(drive))
+        Model(system_with_terms(system, terms, pairs), dict(sensors), of_base(drive))
     )
     inside = [within(parameter) for parameter in parameters]
     report("preparing the fits", None)

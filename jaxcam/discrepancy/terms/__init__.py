@@ -39,6 +39,12 @@ from ._sensed import (
     watched as watched,
 )
 from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
+from ._switched_base import (
+    SwitchedWithHidden as SwitchedWithHidden,
+    SwitchedWithTerms as SwitchedWithTerms,
+    system_with_element as system_with_element,
+    system_with_terms as system_with_terms,
+)
 from ._term import (
     Motion as Motion,
     SensorTerm as SensorTerm,

@@ -26,6 +26,7 @@ from ._springs import (
     StopAbove,
     StopBelow,
 )
+from ._switched_base import SwitchedWithHidden, SwitchedWithTerms
 from ._term import Motion, strength, Term
 from ._value import Value
 from ._where import Where
@@ -345,5 +346,12 @@ def saved_classes() -> tuple[type, ...]:
         A tuple of classes.
     """
     terms = (type(term) for term in library(extended=True))
-    elements = (WithHidden, Resonator, Relaxation, Hysteresis)
-    return (WithTerms, DriveRipple, *terms, *FREE.values(), *elements)
+    elements = (WithHidden, SwitchedWithHidden, Resonator, Relaxation, Hysteresis)
+    return (
+        WithTerms,
+        SwitchedWithTerms,
+        DriveRipple,
+        *terms,
+        *FREE.values(),
+        *elements,
+    )

@@ -52,6 +52,10 @@ class WithHidden(HybridSystem):
         return self.base.breakpoints
 
     @property
+    def active(self) -> bool:  # pyright: ignore
+        return self.base.active
+
+    @property
     def speed(self):
         """Speed of the drive (rad/s), if the base has one."""
         return self.base.speed  # pyright: ignore
@@ -64,18 +68,28 @@ class WithHidden(HybridSystem):
         self.element.check()
 
     def vector_field(self, t, state) -> jax.Array:
+        return self._driven(state, self.base.vector_field(t, self._own(state)))
+
+    def _own(self, state) -> jax.Array:
+        """Return the state of the base."""
+        return state[: -self._size]
+
+    def _driven(self, state, rate) -> jax.Array:
+        """Return the field, for a field of the base."""
         own, hidden = state[: -self._size], state[-self._size :]
-        rate = self.base.vector_field(t, own)
         place, pushed = self.coordinate
         position, velocity = own[place], own[pushed]
         rate = rate.at[pushed].add(self.element.force(position, velocity, hidden))
         return jnp.concatenate([rate, self.element.rate(position, velocity, hidden)])
 
     def gap(self, t, state) -> jax.Array:
-        return self.base.gap(t, state[: -self._size])
+        return self.base.gap(t, self._own(state))
 
     def impact(self, t, state) -> jax.Array:
-        own, hidden = state[: -self._size], state[-self._size :]
-        after = self.base.impact(t, own)
+        return self._kept(state, self.base.impact(t, self._own(state)))
+
+    def _kept(self, state, after) -> jax.Array:
+        """Return states of the base after an event, and the state of the element."""
+        hidden = state[-self._size :]
         kept = jnp.broadcast_to(hidden, (*after.shape[:-1], self._size))
         return jnp.concatenate([after, kept], axis=-1)

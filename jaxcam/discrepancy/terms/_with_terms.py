@@ -45,6 +45,14 @@ class WithTerms(HybridSystem):
         return self.base.period
 
     @property
+    def breakpoints(self):
+        return self.base.breakpoints
+
+    @property
+    def active(self) -> bool:  # pyright: ignore
+        return self.base.active
+
+    @property
     def speed(self):
         """Speed of the drive (rad/s), if the base has one."""
         return self.base.speed  # pyright: ignore
@@ -70,7 +78,10 @@ class WithTerms(HybridSystem):
         return Motion(t, state[place], velocity, *turned, state, pushed)
 
     def vector_field(self, t, state) -> jax.Array:
-        field = self.base.vector_field(t, state)
+        return self._pushed(t, state, self.base.vector_field(t, state))
+
+    def _pushed(self, t, state, field) -> jax.Array:
+        """Return the field of the base with the forces of the terms."""
         rate = field
         for term in self._acting(Where.FLIGHT):
             motion = self.motion(t, state, term.coordinate, field)
@@ -80,6 +91,8 @@ class WithTerms(HybridSystem):
 
     def gap(self, t, state) -> jax.Array:
         gap = self.base.gap(t, state)
+        if not gap.size:
+            return gap
         for number in self._numbers(Where.CONTACT):
             raised = self._raised(t, number)
             gap = gap - raised if gap.ndim == 0 else gap.at[number].add(-raised)
@@ -88,7 +101,7 @@ class WithTerms(HybridSystem):
     def impact(self, t, state) -> jax.Array:
         after = self.base.impact(t, state)
         changed = {*self._numbers(Where.CONTACT), *self._numbers(Where.IMPACT)}
-        if not changed:
+        if not changed or not after.size:
             return after
         if after.ndim == 1:
             return self._landed(t, state, 0)

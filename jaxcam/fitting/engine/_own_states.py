@@ -12,6 +12,7 @@ from ._linear import Extras, flight_inputs, flown
 from ._linearise import Layout, Point
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
+from ._predict import after_impact
 from ._program import program
 from ._sharpness import states_only
 
@@ -146,10 +147,7 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
 
         def landed(t, x, drive):
             system = model.driven(t, drive)
-            after = system.impact(t, x[:size])
-            if after.ndim == 2:
-                after = after[jnp.argmin(system.gap(t, x[:size]))]
-            return jnp.concatenate([after, x[size:]])
+            return jnp.concatenate([after_impact(system, t, x[:size]), x[size:]])
 
         last = DriveState(*(part[:, -1] for part in pieces.drive))
         hit = jax.vmap(landed)(times, ends, last)

@@ -2,14 +2,17 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...hybrid import HybridSystem
+from ...hybrid import HybridSystem, SwitchedSystem
 from ...hybrid.runge_kutta import array_step, RK4
+from ...hybrid.surface import gaps, impacts
+from ._constant import constant
 from ._model import augmented_field, DriveState, filtered_channels, Model
+from ._modes import on_side_of
+from ._switched_steps import switched_end, switched_nodes
 
 
 # Steps of Newton's method
@@ -36,16 +39,28 @@ def fly(model: Model, state, start, step, drive: DriveState, substeps: int = 1):
 
     **Returns:** the state at its end `(n,)`, and its `Nodes`.
     """
-    states, fields = _nodes(model, state, start, step, drive, 1)
-    if substeps > 1:
-        still, begin = _constant((model, state))
-        fine = _nodes(still, begin, start, step, drive, substeps)
-        states, fields = (
-            coarse + jax.lax.stop_gradient(better - coarse)
-            for better, coarse in zip(fine, (states, fields))
-        )
+    if isinstance(model.system, SwitchedSystem):
+        states, fields, _ = switched_nodes(model, state, start, step, drive, substeps)
+    else:
+        states, fields = _nodes(model, state, start, step, drive, 1)
+        if substeps > 1:
+            still, begin = constant((model, state))
+            fine = _nodes(still, begin, start, step, drive, substeps)
+            states, fields = (
+                coarse + jax.lax.stop_gradient(better - coarse)
+                for better, coarse in zip(fine, (states, fields))
+            )
     values, rates = jax.vmap(lambda x, f: _raw(model, x, f))(states, fields)
     return states[-1], Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
+
+
+def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps):
+    """Return the state at the end of a piece, `(n,)`, without derivatives; `substeps`
+    may be traced.
+    """
+    if isinstance(model.system, SwitchedSystem):
+        return switched_end(model, state, start, step, drive, substeps)
+    return _nodes(model, state, start, step, drive, substeps)[0][-1]
 
 
 def _nodes(model: Model, state, start, step, drive: DriveState, substeps: int):
@@ -56,7 +71,7 @@ def _nodes(model: Model, state, start, step, drive: DriveState, substeps: int):
         number, here = inputs
         t0 = start + number * step
         system_at = model.during(t0 + step / 2, here)
-        if substeps == 1:
+        if isinstance(substeps, int) and substeps == 1:
             x1, k1 = runge_kutta(model, system_at, t0, x, step)
             return x1, (x, k1)
 
@@ -132,7 +147,7 @@ def contact_state(system, t, guess):
 
     # the search and the slopes at the root need no derivatives: the residuals below
     # provide all of them
-    fixed, when = _constant(system), jax.lax.stop_gradient(t)
+    fixed, when = constant(system), jax.lax.stop_gradient(t)
 
     def newton(_, carried):
         def twice(t, x):
@@ -152,17 +167,6 @@ def contact_state(system, t, guess):
         lambda t, x: conditions(system, t, x), (t, x), (jnp.ones_like(t), rate)
     )
     return (x,), (rate - _least(slopes, changing),)
-
-
-def _constant(tree):
-    """Return the same numbers without derivatives, so a loop over them is not
-    differentiated.
-    """
-
-    def fixed(leaf):
-        return jax.lax.stop_gradient(leaf) if eqx.is_inexact_array(leaf) else leaf
-
-    return jax.tree.map(fixed, tree)
 
 
 def _least(slopes, residual):
@@ -259,8 +263,9 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
             return smallest_gap(system, t, x[:size])
 
         def move(x):
-            x = runge_kutta(model, lambda t: system, t, x, shift)[0]
-            field = augmented_field(model, system, t + shift, x)
+            branch = on_side_of(system, t, x[:size])
+            x = runge_kutta(model, lambda t: branch, t, x, shift)[0]
+            field = augmented_field(model, branch, t + shift, x)
             along = jnp.ones_like(t), field
             return x, field, *jax.jvp(gap, (t + shift, x), along)
 
@@ -272,7 +277,7 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
         return -(gaps[1] - gaps[0]) / jax.lax.stop_gradient(slope)
 
     # the search needs no derivatives: its last step, from a fixed start, provides them
-    fixed = _constant((model, system, flights))
+    fixed = constant((model, system, flights))
 
     def newton(_, shift):
         model, system, flights = fixed
@@ -288,20 +293,29 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
     last = jnp.where(inside, last, jnp.clip(shift + last, -reach, reach) - shift)
     before, after = states + last * fields
     shift = shift + last
-    landed = system.impact(t + shift, before[:size])
-    if landed.ndim == 2:
-        landed = landed[jnp.argmin(system.gap(t + shift, before[:size]))]
+    landed = after_impact(system, t + shift, before[:size])
     landed = jnp.concatenate([landed, before[size:]])
     return Joint(after - landed, smallest_gap(system, t + shift, before[:size]))
 
 
+def after_impact(system: HybridSystem, t, x) -> Float[Array, " n"]:
+    """Return the state after an impact at the smallest gap; unchanged without gaps."""
+    landed = impacts(system, t, x)
+    if len(landed) < 2:
+        return landed[0] if len(landed) else x
+    return landed[jnp.argmin(gaps(system, t, x))]
+
+
 def smallest_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
-    """Return the smallest gap.
+    """Return the smallest gap; one if the system has none.
 
     `min` is not used, because its derivative tests values for equality, which may fail
     if a program computes one of them twice.
     """
-    first, *others = jnp.atleast_1d(system.gap(t, x))
+    found = gaps(system, t, x)
+    if not len(found):
+        return jnp.ones(())
+    first, *others = found
     for other in others:
         first = jnp.where(other < first, other, first)
     return first

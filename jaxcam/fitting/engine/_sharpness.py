@@ -9,7 +9,7 @@ from ._linear import Extras, Sharpness
 from ._linearise import assemble, Layout, Point
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
-from ._predict import fly, smallest_gap
+from ._predict import after_impact, fly, smallest_gap
 from ._program import program
 
 
@@ -199,11 +199,8 @@ def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
             x = state + by_rate(state) * off[2]
             shifted = drive.angle + off[0], drive.rate + off[1], drive.acceleration
             system = model.driven(t, DriveState(*shifted))
-            after = system.impact(t, x[:size])
             gap = smallest_gap(system, t, x[:size])
-            if after.ndim == 2:
-                after = after[jnp.argmin(system.gap(t, x[:size]))]
-            after = jnp.concatenate([after, x[size:]])
+            after = jnp.concatenate([after_impact(system, t, x[:size]), x[size:]])
             after = after - by_rate(after) * off[2]
             return jnp.concatenate([after, gap[None]])
 

@@ -10,7 +10,7 @@ from ._linear import Extras
 from ._linearise import Layout, Point
 from ._model import DriveState, Input, Model
 from ._pieces import Pieces
-from ._predict import fly
+from ._predict import end_of_flight, fly
 from ._program import program
 
 
@@ -72,21 +72,23 @@ def enough_substeps(
     part_of_error = _STEP_ERROR / max(1.0, flight / _LONG) ** 1.5
     scale = np.asarray(extras.sharpness.piece)
     inside = np.asarray(pieces.exists)[..., None]
-    coarse = _ends(layout, pieces, point)
-    while pieces.substeps < _MOST_SUBSTEPS:
-        finer = dataclasses.replace(pieces, substeps=2 * pieces.substeps)
-        fine = _ends(layout, finer, point)
+    substeps, once = pieces.substeps, dataclasses.replace(pieces, substeps=1)
+    coarse = _ends(layout, once, point, jnp.asarray(substeps))
+    while substeps < _MOST_SUBSTEPS:
+        fine = _ends(layout, once, point, jnp.asarray(2 * substeps))
         change = np.abs(coarse - fine) / scale
         if np.max(np.where(inside, change, 0.0)) < part_of_error:
             break
-        pieces, coarse = finer, fine
-    return pieces
+        substeps, coarse = 2 * substeps, fine
+    return dataclasses.replace(pieces, substeps=substeps)
 
 
 @program
-def _ends(layout: Layout, pieces: Pieces, point: Point):
-    def one(model, substeps, *piece):
-        return fly(model, *piece, substeps=substeps)[0]
+def _ends(layout: Layout, pieces: Pieces, point: Point, substeps):
+    """Return the states at the ends; one program serves every number of substeps."""
+
+    def one(model, *piece):
+        return end_of_flight(model, *piece, substeps)
 
     return _of_each(layout, pieces, point, one)
 
@@ -95,8 +97,7 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
 def _off_middles(layout: Layout, pieces: Pieces, point: Point):
     """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
 
-    def one(model, substeps, state, start, step, drive):
-        del substeps
+    def one(model, state, start, step, drive):
         # drive and input are linear within a step: their values in its halves
         twice = DriveState(*(jnp.repeat(part, 2, axis=-1) for part in drive))
         quarter = jnp.tile(jnp.array([-0.25, 0.25]), drive.angle.shape[-1]) * step
@@ -115,7 +116,7 @@ def _of_each(layout: Layout, pieces: Pieces, point: Point, one):
 
     def record(values, *inputs):
         model = layout.at(values)
-        return jax.vmap(lambda *piece: one(model, pieces.substeps, *piece))(*inputs)
+        return jax.vmap(lambda *piece: one(model, *piece))(*inputs)
 
     times = jnp.asarray(part.start), jnp.asarray(part.step)
     return jax.vmap(record)(point.values, point.states, *times, pieces.drive)

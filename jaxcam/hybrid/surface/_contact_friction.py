@@ -13,9 +13,7 @@ from ._switches import OnSides, surfaces
 def has_friction(system: HybridSystem) -> bool:
     """Return whether the contacts of a system have friction."""
     switched = _whole(system)
-    if not isinstance(switched, SwitchedSystem):
-        return False
-    return type(switched).contact_friction is not SwitchedSystem.contact_friction
+    return isinstance(switched, SwitchedSystem) and switched.has_contact_friction
 
 
 def sides_of(system: HybridSystem, t, x) -> Float[Array, " k"]:

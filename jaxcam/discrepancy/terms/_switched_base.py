@@ -1,0 +1,146 @@
+"""Add terms and elements to systems with switching surfaces."""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+
+from ...hybrid import HybridSystem, SwitchedSystem
+from ._hidden_elements import HiddenElement
+from ._term import Term
+from ._with_hidden import WithHidden
+from ._with_terms import WithTerms
+
+
+class SwitchedWithTerms(WithTerms, SwitchedSystem):
+    """A switched system and terms added to each of its branches."""
+
+    base: SwitchedSystem
+    """The system."""
+
+    def vector_field(self, t, state) -> jax.Array:
+        return self.branch(t, state, self.sides(t, state))
+
+    def switching(self, t, state):
+        return self.base.switching(t, state)
+
+    def branch(self, t, state, sides) -> jax.Array:
+        return self._pushed(t, state, self.base.branch(t, state, sides))
+
+    def sides(self, t, state):
+        return self.base.sides(t, state)
+
+    @property
+    def hysteresis(self):
+        return self.base.hysteresis
+
+    @property
+    def holding(self):
+        return self.base.holding
+
+    @property
+    def restitution_kind(self):
+        return self.base.restitution_kind
+
+    @property
+    def has_contact_friction(self) -> bool:
+        return self.base.has_contact_friction
+
+    def contact_friction(self, t, state, sides):
+        return self.base.contact_friction(t, state, sides)
+
+    def reset(self, t, state, sides):
+        return self.base.reset(t, state, sides)
+
+
+class SwitchedWithHidden(WithHidden, SwitchedSystem):
+    """A switched system with an element that has an internal state, which does not
+    change at the surfaces.
+    """
+
+    base: SwitchedSystem
+    """The system, a `SwitchedWithTerms` or any other."""
+
+    def vector_field(self, t, state) -> jax.Array:
+        return self.branch(t, state, self.sides(t, state))
+
+    def switching(self, t, state):
+        return self.base.switching(t, self._own(state))
+
+    def branch(self, t, state, sides) -> jax.Array:
+        return self._driven(state, self.base.branch(t, self._own(state), sides))
+
+    def sides(self, t, state):
+        return self.base.sides(t, self._own(state))
+
+    @property
+    def hysteresis(self):
+        return self.base.hysteresis
+
+    @property
+    def holding(self):
+        return self.base.holding
+
+    @property
+    def restitution_kind(self):
+        return self.base.restitution_kind
+
+    @property
+    def has_contact_friction(self) -> bool:
+        return self.base.has_contact_friction
+
+    def contact_friction(self, t, state, sides):
+        rows = self.base.contact_friction(t, self._own(state), sides)
+        none = jnp.zeros((*rows.shape[:-1], self._size))
+        return jnp.concatenate([rows, none], axis=-1)
+
+    def reset(self, t, state, sides):
+        return self._kept(state, self.base.reset(t, self._own(state), sides))
+
+
+def system_with_terms(
+    base: HybridSystem, terms: Sequence[Term], coordinates=((0, 1),)
+) -> WithTerms:
+    """Return a system and terms added to it, with its switching surfaces if it has any.
+
+    Args:
+        base: The system.
+        terms: The terms.
+        coordinates: As in [`jaxcam.discrepancy.terms.WithTerms`][].
+
+    Returns:
+        The system with the terms.
+
+    Examples:
+        >>> from jaxcam.discrepancy.terms import system_with_terms
+        >>> from jaxcam.models import BilinearOscillator
+        >>> type(system_with_terms(BilinearOscillator(), ())).__name__
+        'SwitchedWithTerms'
+    """
+    if isinstance(base, SwitchedSystem):
+        return SwitchedWithTerms(base, tuple(terms), coordinates)
+    return WithTerms(base, tuple(terms), coordinates)
+
+
+def system_with_element(
+    base: HybridSystem, element: HiddenElement, coordinate: tuple[int, int]
+) -> WithHidden:
+    """Return a system with an element, with its switching surfaces if it has any.
+
+    Args:
+        base: The system.
+        element: The element.
+        coordinate: As in [`jaxcam.discrepancy.terms.WithHidden`][].
+
+    Returns:
+        The system with the element.
+
+    Examples:
+        >>> from jaxcam.discrepancy.terms import Relaxation, system_with_element
+        >>> from jaxcam.models import ImpactOscillator
+        >>> type(system_with_element(ImpactOscillator(), Relaxation(), (0, 1))).__name__
+        'WithHidden'
+    """
+    if isinstance(base, SwitchedSystem):
+        return SwitchedWithHidden(base, element, coordinate)
+    return WithHidden(base, element, coordinate)

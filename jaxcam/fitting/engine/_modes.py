@@ -1,0 +1,113 @@
+"""The modes of a switched system in a fit: sides of its surfaces, and sliding."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ...hybrid import HybridSystem, SwitchedSystem
+from ...hybrid.loop import jumping_components
+from ...hybrid.surface import (
+    beyond_shares,
+    InMode,
+    Jumps,
+    OnSides,
+    resets,
+    slack_of_hold,
+    surfaces,
+    switching_distances,
+)
+
+
+class Mode(NamedTuple):
+    """The side of each surface, and whether the motion slides on it, `(k,)` each."""
+
+    negative: Bool[Array, " k"]
+    sliding: Bool[Array, " k"]
+
+
+class Surfaces(NamedTuple):
+    """What the structure of a switched system determines."""
+
+    number: int
+    jumps: Jumps
+    """The components of the field that change at each surface."""
+
+    def within(self, system: HybridSystem, mode: Mode) -> InMode:
+        """Return the system in one mode, without contacts."""
+        assert isinstance(system, SwitchedSystem)
+        none = jnp.zeros((0,), dtype=bool)
+        return InMode(system, mode.negative, mode.sliding, none, self.jumps)
+
+
+def surfaces_in(system: SwitchedSystem, t, x) -> Surfaces:
+    """Return the number of surfaces, and the components that change at them."""
+    values, static = eqx.partition(system, eqx.is_inexact_array)
+    shapes, time, state = jax.eval_shape(lambda *a: a, values, t, x)
+    number = jax.eval_shape(lambda s, y: surfaces(system, s, y), time, state).shape[0]
+    return Surfaces(number, jumping_components(static, shapes, time, state, number))
+
+
+def first_mode(system: SwitchedSystem, t, x) -> Mode:
+    """Return the mode in which a motion starts; sliding begins in the first step."""
+    negative = system.sides(t, x) < 0
+    return Mode(negative, jnp.zeros_like(negative))
+
+
+def on_side_of(system: HybridSystem, t, x) -> HybridSystem:
+    """Return a system whose field is smooth near a state: the branch on its side."""
+    if not isinstance(system, SwitchedSystem):
+        return system
+    return OnSides(system, jax.lax.stop_gradient(system.sides(t, x)) < 0)
+
+
+def distances_along(system: InMode, t, x, rate):
+    """Return the distances and their rates when `x` changes at `rate`, `(k,)` each."""
+    along = jnp.ones_like(t), rate
+    return jax.jvp(lambda s, y: switching_distances(system, s, y), (t, x), along)
+
+
+def state_after(system: InMode, t, x, ends: Bool[Array, " k"]) -> Float[Array, " n"]:
+    """Return the state after the event at one surface: reset, if it is a crossing."""
+    rows = resets(OnSides(system.system, system.negative), t, x)
+    landed = jnp.sum(jnp.where(ends[:, None], rows, 0.0), axis=0)
+    return jnp.where(jnp.any(ends & ~system.sliding), landed, x)
+
+
+def mode_after(
+    known: Surfaces, system: InMode, t, x, after, ends: Bool[Array, " k"]
+) -> Mode:
+    """Return the mode after the event at one surface.
+
+    A crossing changes the side; if the branch beyond the surface points back, the
+    motion slides. Sliding ends on the side whose weight has reached one.
+
+    Args:
+        known: The surfaces.
+        system: The system in its mode before the event.
+        t: Time of the event (s).
+        x: State before the event, shape `(n,)`.
+        after: State after the event, shape `(n,)`.
+        ends: The surface, shape `(k,)`.
+
+    Returns:
+        The mode.
+    """
+    slidable = [bool(changed) for changed in known.jumps.free]
+    slid = system.sliding & ends
+    if not any(slidable):
+        return Mode(system.negative ^ ends, system.sliding)
+    turns = ends & (~slid | (beyond_shares(system, t, x) > 0.5))
+    left = Mode(system.negative ^ turns, system.sliding & ~ends)
+    _, before = distances_along(system, t, x, system.vector_field(t, x))
+    beyond = known.within(system.system, left)
+    _, rate = distances_along(beyond, t, after, beyond.vector_field(t, after))
+    # static friction stops a motion that kinetic friction would not reverse
+    slack = slack_of_hold(system)
+    back = rate <= jnp.maximum(-before, 0.0) * slack / (1 + slack)
+    # with hysteresis, the other threshold is a finite distance away
+    firm = jnp.broadcast_to(jnp.asarray(system.system.hysteresis), back.shape) == 0
+    arrives = ends & ~slid & back & firm & jnp.array(slidable)
+    return Mode(left.negative, left.sliding | arrives)

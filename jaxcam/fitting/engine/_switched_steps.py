@@ -1,0 +1,318 @@
+"""Integrate a switched system in steps that end at its events.
+
+The events of a piece are located first, without derivatives. With the lengths of the
+parts between them known, the motion is integrated once more, and each event moves by
+the implicit function theorem. The derivatives therefore contain the saltation matrices
+of all crossings, of the beginning of sliding and of its end.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from ...hybrid.runge_kutta import array_step, RK4
+from ...hybrid.surface import switching_distances
+from ._constant import constant
+from ._model import augmented_field, DriveState, filtered_channels, Model
+from ._modes import (
+    distances_along,
+    first_mode,
+    Mode,
+    mode_after,
+    state_after,
+    Surfaces,
+    surfaces_in,
+)
+
+
+# Events that are located in a piece; pieces are shorter than half an oscillation
+_EVENTS = 8
+# Runge-Kutta steps that locate an event: to the end, of length zero, and those of the
+# Illinois method
+_SEARCH = 10
+
+
+class Part(NamedTuple):
+    """A part of a step: up to an event or to the end of the step."""
+
+    number: Int[Array, ""]
+    """Index of the step."""
+    offset: Float[Array, ""]
+    """Time since the beginning of the step (s)."""
+    length: Float[Array, ""]
+    """Duration (s)."""
+    state: Float[Array, " s"]
+    """State at the beginning, shape `(s,)`."""
+    mode: Mode
+    """Mode of the motion."""
+    ends: Bool[Array, " k"]
+    """The surface whose event ends the part, if any."""
+    after: Mode
+    """Mode of the motion after the part."""
+
+
+class Located(NamedTuple):
+    """The parts of a piece between its events, and its end."""
+
+    parts: Part
+    """The parts, also those between substeps."""
+    end: Float[Array, " s"]
+    """State at the end, shape `(s,)`."""
+    mode: Mode
+    """Mode at the end."""
+
+
+class _Steps(NamedTuple):
+    """The steps of a piece."""
+
+    model: Model
+    start: Float[Array, ""]
+    step: Float[Array, ""]
+    drive: DriveState
+    surfaces: Surfaces
+    size: int
+    """Number of components of the system's state, without those of sensor filters."""
+
+    @property
+    def count(self) -> int:
+        return self.drive.angle.shape[0]
+
+    def begin(self, number):
+        """Return the time at which a step begins."""
+        return self.start + jnp.asarray(number, dtype=float) * self.step
+
+    def in_mode(self, number, mode: Mode) -> Callable:
+        """Return the system in one mode as a function of time, during a step."""
+        here = DriveState(*(part[number] for part in self.drive))
+        system_at = self.model.during(self.begin(number) + self.step / 2, here)
+        return lambda t: self.surfaces.within(system_at(t), mode)
+
+    def field(self, number, mode: Mode) -> Callable:
+        """Return the vector field in one mode, sensor filters included."""
+        system_at = self.in_mode(number, mode)
+        return lambda t, x: augmented_field(self.model, system_at(t), t, x)
+
+
+def switched_nodes(
+    model: Model, state, start, step, drive: DriveState, substeps: int, mode=None
+):
+    """Return the states at the ends of all steps `(n + 1, s)`, their rates, and the
+    mode at the end.
+
+    **Arguments:** as for `fly`, and the `mode` at the start; default: that of a motion
+    that starts there.
+    """
+    steps, mode = _steps(model, state, start, step, drive, mode)
+    found = _located(*constant((steps, state, mode)), substeps)
+    states, rates, end = _integrated(steps, state, _merged(found.parts, steps))
+    states = jnp.concatenate([states, end[None]])
+    if substeps > 1:
+        fine = jnp.concatenate([_at_steps(found.parts, steps).state, found.end[None]])
+        states = states + jax.lax.stop_gradient(fine - states)
+    last = steps.field(steps.count - 1, found.mode)
+    final = last(start + steps.count * step, states[-1])
+    return states, jnp.concatenate([rates, final[None]]), found.mode
+
+
+def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
+    """Return the state at the end, `(s,)`, without derivatives; `substeps` may be
+    traced.
+    """
+    steps, mode = _steps(model, state, start, step, drive, None)
+    advance = _advancing(steps, substeps)
+    found = jax.lax.while_loop(
+        lambda one: one.place < steps.count * substeps,
+        lambda one: advance(one, None)[0],
+        _begun(steps, state, mode),
+    )
+    return found.state
+
+
+def _steps(model: Model, state, start, step, drive: DriveState, mode):
+    size = state.shape[0] - len(filtered_channels(model))
+    first = DriveState(*(part[0] for part in drive))
+    system = model.during(start + step / 2, first)(start)
+    known = surfaces_in(system, start, state[:size])
+    if mode is None:
+        mode = first_mode(system, start, state[:size])
+    return _Steps(model, start, step, drive, known, size), mode
+
+
+def _located(steps: _Steps, state, mode: Mode, substeps: int) -> Located:
+    """Locate the events of a piece; its parts end there and at the ends of substeps."""
+    advance = _advancing(steps, substeps)
+    first, count = _begun(steps, state, mode), steps.count * substeps
+    last, parts = jax.lax.scan(advance, first, length=count + _EVENTS)
+    return Located(parts, last.state, last.mode)
+
+
+class _Place(NamedTuple):
+    """How far the search for events has come."""
+
+    place: Int[Array, ""]
+    """Number of substeps that are finished."""
+    passed: Float[Array, ""]
+    """Time since then (s)."""
+    state: Float[Array, " s"]
+    mode: Mode
+    events: Int[Array, ""]
+
+
+def _begun(steps: _Steps, state, mode: Mode) -> _Place:
+    zero = jnp.zeros((), dtype=int)
+    return _Place(zero, jnp.zeros_like(steps.step), state, mode, zero)
+
+
+def _advancing(steps: _Steps, substeps):
+    """Return the function that advances to the next event or end of a substep."""
+    short = steps.step / jnp.asarray(substeps, dtype=float)
+    count = steps.count * substeps
+
+    def advance(carried: _Place, _):
+        place, passed, x, mode, events = carried
+        idle = place >= count
+        inside = jnp.minimum(place, count - 1)
+        number = inside // substeps
+        within = jnp.asarray(inside - number * substeps, dtype=float)
+        offset = within * short + passed
+        left = jnp.where(idle, 0.0, short - passed)
+        t = steps.begin(number) + offset
+        wanted = (events < _EVENTS) & ~idle
+        found = _first_event(steps, number, t, x, mode, left, wanted)
+        part = Part(number, offset, found.length, x, mode, found.ends, found.mode)
+        part = part._replace(number=jnp.where(idle, steps.count, number))
+        event = jnp.any(found.ends)
+        done = ~event & ~idle
+        passed = jnp.where(done, 0.0, passed + found.length)
+        place, events = place + done.astype(int), events + event.astype(int)
+        return _Place(place, passed, found.state, found.mode, events), part
+
+    return advance
+
+
+class _Reached(NamedTuple):
+    """The end of a part."""
+
+    length: Float[Array, ""]
+    state: Float[Array, " s"]
+    ends: Bool[Array, " k"]
+    mode: Mode
+
+
+def _first_event(steps: _Steps, number, t, x, mode: Mode, left, wanted) -> _Reached:
+    """Return the first event within some time, or the motion at its end.
+
+    The smallest of the distances that are negative at the end falls through zero at the
+    first event.
+    """
+    field, system_at = steps.field(number, mode), steps.in_mode(number, mode)
+    size = steps.size
+
+    def narrow(carried):
+        turn, a, low, b, high, kept, crossed, whole, _ = carried
+        trial = jnp.where(low > 0, (a * high - b * low) / (high - low), a)
+        trial = jnp.where(turn == 0, left, jnp.where(turn == 1, 0.0, trial))
+        there, _, _ = array_step(RK4, field, t, x, trial)
+        distances = switching_distances(system_at(t + trial), t + trial, there[:size])
+        whole = jnp.where(turn == 0, there, whole)
+        crossed = jnp.where(turn == 0, wanted & (distances < 0), crossed)
+        least = jnp.argmin(jnp.where(crossed, distances, jnp.inf))
+        value, last = distances[least], (least, trial, there)
+        beyond = (value < 0) & (turn != 1)
+        # the value at an end that stays twice is halved
+        low_kept = jnp.where((turn > 2) & beyond & (kept == 1), low / 2, low)
+        high_kept = jnp.where((turn > 2) & ~beyond & (kept == 2), high / 2, high)
+        return (
+            turn + 1,
+            jnp.where(beyond, a, trial),
+            jnp.where(beyond, low_kept, value),
+            jnp.where(beyond, trial, b),
+            jnp.where(beyond, value, high_kept),
+            jnp.where(beyond, 1, 2),
+            crossed,
+            whole,
+            last,
+        )
+
+    def more(carried):
+        turn, _, low, *_, crossed, _, _ = carried
+        begins = jnp.any(crossed) & ((turn < 2) | (low > 0)) & (turn < _SEARCH)
+        return (turn == 0) | begins
+
+    zero, none = jnp.zeros((), dtype=int), jnp.zeros_like(left)
+    surfaces = jnp.zeros((steps.surfaces.number,), dtype=bool)
+    begin = (zero, none, none, left, -jnp.ones_like(left), zero, surfaces, x)
+    *_, crossed, whole, (least, length, there) = jax.lax.while_loop(
+        more, narrow, (*begin, (zero, left, x))
+    )
+    found = jnp.any(crossed)
+    ends = found & (jnp.arange(steps.surfaces.number) == least)
+    at, y = t + length, there[:size]
+    system = system_at(at)
+    landed = state_after(system, at, y, ends)
+    new = mode_after(steps.surfaces, system, at, y, landed, ends)
+    there = there.at[:size].set(landed)
+    return _Reached(
+        jnp.where(found, length, left),
+        jnp.where(found, there, whole),
+        ends,
+        Mode(*(jnp.where(found, a, b) for a, b in zip(new, mode))),
+    )
+
+
+def _at_steps(parts: Part, steps: _Steps) -> Part:
+    """Return the part with which each step begins."""
+    first = jnp.searchsorted(parts.number, jnp.arange(steps.count))
+    return jax.tree.map(lambda one: one[first], parts)
+
+
+def _merged(parts: Part, steps: _Steps) -> Part:
+    """Join the parts of each step that no event separates."""
+    count, number = steps.count + _EVENTS, parts.number
+    new = jnp.concatenate([jnp.ones(1, dtype=bool), number[1:] != number[:-1]])
+    event = jnp.any(parts.ends, axis=-1)
+    new = new | jnp.concatenate([jnp.zeros(1, dtype=bool), event[:-1]])
+    (begin,) = jnp.nonzero(new & (number < steps.count), size=count, fill_value=-1)
+    total = len(number)
+    begin = jnp.where(begin < 0, total, begin)
+    last = jnp.append(begin[1:], total) - 1
+    passed = jnp.append(0.0, jnp.cumsum(parts.length))
+    first, final = (
+        jax.tree.map(lambda one, at=at: one[at], parts)
+        for at in (jnp.minimum(begin, total - 1), last)
+    )
+    return first._replace(
+        length=passed[last + 1] - passed[begin], ends=final.ends, after=final.after
+    )
+
+
+def _integrated(steps: _Steps, state, parts: Part):
+    """Return the state and the rate at the beginning of each step, and the state at the
+    end, with derivatives.
+    """
+    size = steps.size
+
+    def advance(x, part: Part):
+        number = jnp.minimum(part.number, steps.count - 1)
+        t = steps.begin(number) + part.offset
+        field = steps.field(number, part.mode)
+        there, _, rate = array_step(RK4, field, t, x, part.length)
+        t = t + part.length
+        before, system = field(t, there), steps.in_mode(number, part.mode)(t)
+        distances, slopes = distances_along(system, t, there[:size], before[:size])
+        distance = jnp.sum(jnp.where(part.ends, distances, 0.0))
+        slope = jax.lax.stop_gradient(jnp.sum(jnp.where(part.ends, slopes, 0.0)))
+        # where the motion hardly approaches the surface, the time is not differentiated
+        slope = jnp.where(slope < 0, slope, -jnp.inf)
+        later = -(distance - jax.lax.stop_gradient(distance)) / slope
+        landed = state_after(system, t, (there + later * before)[:size], part.ends)
+        moved = (there + later * before).at[:size].set(landed)
+        moved = moved - later * steps.field(number, part.after)(t, moved)
+        return jnp.where(jnp.any(part.ends), moved, there), (x, rate)
+
+    end, (states, rates) = jax.lax.scan(advance, state, parts)
+    first = jnp.searchsorted(parts.number, jnp.arange(steps.count))
+    return states[first], rates[first], end
