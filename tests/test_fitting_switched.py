@@ -13,6 +13,7 @@ from jax.flatten_util import ravel_pytree
 import jaxcam
 from jaxcam.fitting import (
     fit,
+    free_run,
     Model,
     Parameter,
     Problem,
@@ -172,3 +173,10 @@ def test_friction_and_stop_of_a_recorded_cart(carts):
         off = one.value - float(getattr(Cart(), one.name))
         assert abs(off) < 4 * one.stderr
         assert one.stderr < 1e-3 * one.value
+
+
+def test_a_free_run_sticks_where_the_motion_does(carts):
+    """Samples of a recording of four seconds with the true parameters, to the noise."""
+    runs, model = carts
+    found = free_run(Model(Cart(), SENSORS), runs[0], samples=40)
+    assert found.rmse["position_m"] < 3 * 1e-5

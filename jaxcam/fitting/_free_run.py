@@ -11,15 +11,19 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..hybrid import SwitchedSystem
+from ..hybrid.surface import gaps
 from ..recordings import Recording, RecordingError, Segments
 from .engine import (
     augmented_field,
     DriveState,
     filtered_channels,
+    first_mode,
     Input,
     Model,
     runge_kutta,
     state_size,
+    switched_nodes,
     Turning,
     with_constants,
 )
@@ -34,6 +38,8 @@ _FIRST_STEPS, _MOST_STEPS = 2, 64
 # Allowed change of the simulated motion when the steps are halved, in standard
 # deviations of the noise or relative to the motion
 _OF_NOISE, _OF_MOTION = 0.1, 1e-6
+# Switching events that are located between two samples
+_EVENTS = 3
 # Relative difference allowed between sampling intervals
 _UNEVEN = 0.01
 
@@ -216,24 +222,34 @@ def simulated(model: Model, one: Prepared) -> Simulated:
             else:
                 value, slope = jax.jvp(sensor.seen, (x[:size],), (field[:size],))
             values.append(sensor.offset + sensor.gain * (value - sensor.lag * slope))
-        gap = jnp.min(jnp.atleast_1d(system.gap(t, x[:size])))
+        gap = jnp.min(gaps(system, t, x[:size]), initial=jnp.inf)
         return Simulated(jnp.stack(values), gap)
 
-    def sample(x, inputs):
+    def sample(carried, inputs):
+        x, mode = carried
         number, level = inputs
         t = one.start + number * one.interval
         none = jnp.zeros_like(t)
         system = model.driven(t, DriveState(level, none, none))
+        if mode is not None:
+            still = jnp.zeros(one.steps)
+            drive = DriveState(jnp.full(one.steps, level), still, still)
+            found = switched_nodes(model, x, t, step, drive, 1, mode, _EVENTS)
+            return (found[0][-1], found[2]), seen(t, system, x)
 
         def advance(x, k):
             at = t + k * step
             return runge_kutta(model, lambda t: system, at, x, step)[0], None
 
         after, _ = jax.lax.scan(advance, x, jnp.arange(one.steps, dtype=float))
-        return after, seen(t, system, x)
+        return (after, None), seen(t, system, x)
 
-    numbers = jnp.arange(one.level.shape[0], dtype=float)
-    return jax.lax.scan(sample, one.state, (numbers, one.level))[1]
+    numbers, mode = jnp.arange(one.level.shape[0], dtype=float), None
+    if isinstance(model.system, SwitchedSystem):
+        none = jnp.zeros_like(one.start)
+        system = model.driven(one.start, DriveState(one.level[0], none, none))
+        mode = first_mode(system, one.start, one.state[:size])
+    return jax.lax.scan(sample, (one.state, mode), (numbers, one.level))[1]
 
 
 def _first_state(model: Model, data) -> Float[Array, " n"]:

@@ -41,6 +41,7 @@ from ._model import (
     Sensor as Sensor,
     Turning as Turning,
 )
+from ._modes import first_mode as first_mode
 from ._own_states import own_states as own_states
 from ._parameter import Parameter as Parameter
 from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
@@ -50,3 +51,4 @@ from ._problem_checks import parameter_places as parameter_places
 from ._program import program as program
 from ._sharpness import loosened as loosened, separated as separated
 from ._starts import state_size as state_size
+from ._switched_steps import switched_nodes as switched_nodes

@@ -75,6 +75,8 @@ class _Steps(NamedTuple):
     surfaces: Surfaces
     size: int
     """Number of components of the system's state, without those of sensor filters."""
+    events: int
+    """Number of events that are located."""
 
     @property
     def count(self) -> int:
@@ -97,15 +99,22 @@ class _Steps(NamedTuple):
 
 
 def switched_nodes(
-    model: Model, state, start, step, drive: DriveState, substeps: int, mode=None
+    model: Model,
+    state,
+    start,
+    step,
+    drive: DriveState,
+    substeps: int,
+    mode: Mode | None = None,
+    events: int = _EVENTS,
 ):
     """Return the states at the ends of all steps `(n + 1, s)`, their rates, and the
     mode at the end.
 
-    **Arguments:** as for `fly`, and the `mode` at the start; default: that of a motion
-    that starts there.
+    **Arguments:** as for `fly`, the `mode` at the start (default: that of a motion that
+    starts there), and the maximum number of events.
     """
-    steps, mode = _steps(model, state, start, step, drive, mode)
+    steps, mode = _steps(model, state, start, step, drive, mode, events)
     found = _located(*constant((steps, state, mode)), substeps)
     states, rates, end = _integrated(steps, state, _merged(found.parts, steps))
     states = jnp.concatenate([states, end[None]])
@@ -121,7 +130,7 @@ def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
     """Return the state at the end, `(s,)`, without derivatives; `substeps` may be
     traced.
     """
-    steps, mode = _steps(model, state, start, step, drive, None)
+    steps, mode = _steps(model, state, start, step, drive, None, _EVENTS)
     advance = _advancing(steps, substeps)
     found = jax.lax.while_loop(
         lambda one: one.place < steps.count * substeps,
@@ -131,21 +140,21 @@ def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
     return found.state
 
 
-def _steps(model: Model, state, start, step, drive: DriveState, mode):
+def _steps(model: Model, state, start, step, drive: DriveState, mode, events):
     size = state.shape[0] - len(filtered_channels(model))
     first = DriveState(*(part[0] for part in drive))
     system = model.during(start + step / 2, first)(start)
     known = surfaces_in(system, start, state[:size])
     if mode is None:
         mode = first_mode(system, start, state[:size])
-    return _Steps(model, start, step, drive, known, size), mode
+    return _Steps(model, start, step, drive, known, size, events), mode
 
 
 def _located(steps: _Steps, state, mode: Mode, substeps: int) -> Located:
     """Locate the events of a piece; its parts end there and at the ends of substeps."""
     advance = _advancing(steps, substeps)
     first, count = _begun(steps, state, mode), steps.count * substeps
-    last, parts = jax.lax.scan(advance, first, length=count + _EVENTS)
+    last, parts = jax.lax.scan(advance, first, length=count + steps.events)
     return Located(parts, last.state, last.mode)
 
 
@@ -180,7 +189,7 @@ def _advancing(steps: _Steps, substeps):
         offset = within * short + passed
         left = jnp.where(idle, 0.0, short - passed)
         t = steps.begin(number) + offset
-        wanted = (events < _EVENTS) & ~idle
+        wanted = (events < steps.events) & ~idle
         found = _first_event(steps, number, t, x, mode, left, wanted)
         part = Part(number, offset, found.length, x, mode, found.ends, found.mode)
         part = part._replace(number=jnp.where(idle, steps.count, number))
@@ -271,7 +280,7 @@ def _at_steps(parts: Part, steps: _Steps) -> Part:
 
 def _merged(parts: Part, steps: _Steps) -> Part:
     """Join the parts of each step that no event separates."""
-    count, number = steps.count + _EVENTS, parts.number
+    count, number = steps.count + steps.events, parts.number
     new = jnp.concatenate([jnp.ones(1, dtype=bool), number[1:] != number[:-1]])
     event = jnp.any(parts.ends, axis=-1)
     new = new | jnp.concatenate([jnp.zeros(1, dtype=bool), event[:-1]])
