@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from ._flight import moves_in, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
-from ._loop_state import LoopState
-from ._select import select
+from ._loop_state import COMPLETED, LoopState
+from ._select import any_of, select
 from ._step import Step
 
 
@@ -37,13 +37,17 @@ class Passed(NamedTuple):
     slides: list
     # whether the motion cannot leave a surface, and cannot slide along it
     stuck: Any
+    # whether the sum of a chatter has passed a surface that stops it
+    passed_over: Any
 
 
-def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h):
-    """Let a surface be crossed at once where a jump of the state has crossed it."""
+def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h, stops):
+    """Let a surface be crossed at once where a jump of the state has crossed it, or
+    where it `stops` the motion.
+    """
     m = len(carried.held)
     for k, behind in enumerate(carried.behind, start=m):
-        now, seen = behind & (h == 0), verdicts[k]
+        now, seen = (behind | stops[k - m]) & (h == 0), verdicts[k]
         verdicts[k] = seen._replace(
             retake=seen.retake & ~now,
             length=jnp.where(now, jnp.inf, seen.length),
@@ -51,6 +55,36 @@ def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h):
             offset=jnp.where(now, 0.0, seen.offset),
         )
     return verdicts
+
+
+def stopped_by_impacts(functions: Functions, carried: LoopState) -> list:
+    """Return for each surface whether the motion slides along it once contact begins.
+
+    Impacts can stop the slip before static friction has to hold it. Then the weights of
+    the branches must be within the limits of sliding.
+    """
+    flags = [jnp.asarray(False) for _ in range(functions.k)]
+    if not (functions.m and functions.slidable):
+        return flags
+    now = (carried.stale[0] == COMPLETED) & any_of(carried.contact)
+    for k in functions.slidable:
+        near = jnp.abs(carried.jets[functions.m + k].gap) <= _near(carried, k)
+        flags[k] = now & near & ~carried.sliding[k]
+    pairs = zip(carried.sliding, flags, strict=True)
+    trial = (*carried.mode[: len(carried.jets)], *(a | b for a, b in pairs))
+    shares = functions.shares(carried.t, carried.x, trial)
+    slack = functions.slack(carried.mode)
+    for k in functions.slidable:
+        inside = (shares[k] + slack[k]) * (1 + slack[k] - shares[k]) >= 0
+        # no side drives the motion back to a surface without a weight
+        flags[k] = flags[k] & inside & (shares[k] != 0)
+    return flags
+
+
+def _near(carried: LoopState, k: int):
+    """Return the distance from a surface up to which the state is on it."""
+    row = len(carried.held) + k
+    return _NEAR * carried.scale[row] + 4 * carried.blur[row]
 
 
 def sides_after(
@@ -84,23 +118,36 @@ def sides_after(
 
 
 def past_surfaces(
-    functions: Functions, carried: LoopState, jets, hit, sides: Sides, approach, blur
+    functions: Functions,
+    carried: LoopState,
+    jets,
+    hit,
+    sides: Sides,
+    approach,
+    blur,
+    stops,
 ) -> Passed:
     """Return the jets after the crossing of a surface, whose distance is then zero.
 
     With a hysteresis, the distance is twice the hysteresis; after a reset, it may have
     any value. If the branch beyond the surface points back, the motion slides; the
     field then changes by at most 1 + s times the difference of the branches. `approach`
-    is the (negative) rate at which the motion came, and `blur` the rounding errors of
-    the distances.
+    is the (negative) rate at which the motion came, `blur` the rounding errors of the
+    distances, and `stops` is from `stopped_by_impacts`.
     """
     jets, m = list(jets), functions.m
     slides, stuck = [], jnp.asarray(False)
+    passed_over = stuck
     slack = functions.slack(carried.mode) if functions.slidable else ()
     for k in range(functions.k):
         jet, behind = jets[m + k], carried.behind[k]
-        near = _NEAR * carried.scale[m + k] + 4 * carried.blur[m + k]
+        near = _near(carried, k)
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
+        # a slip that friction stops during the rest of a chatter is summed beyond zero
+        summed = jnp.asarray(False)
+        if functions.m and k in functions.slidable:
+            summed = behind & (carried.stale[0] == COMPLETED)
+            near = jnp.where(summed, jnp.inf, near)
         on = hit[m + k] & ~left & (jnp.abs(jet.gap) <= near)
         back = on & moves_in(jet._replace(gap=jnp.where(on, 0.0, jet.gap)), blur[m + k])
         gap = jnp.where(on | left, 0.0, jet.gap)
@@ -112,7 +159,9 @@ def past_surfaces(
             jets[m + k] = jet._replace(gap=gap)
             continue
         most = -approach * slack[k] / (1 + slack[k])
-        slides.append(on & (jet.velocity <= most))
+        slides.append(on & ((jet.velocity <= most) | stops[k]))
+        if functions.m:
+            passed_over = passed_over | (slides[k] & summed)
         # at the limit of the force the motion leaves without a velocity
         smooth = left & ~behind & (slack[k] == 0)
         velocity = jnp.where(left, jnp.maximum(jet.velocity, 0.0), jet.velocity)
@@ -122,7 +171,7 @@ def past_surfaces(
             jnp.where(smooth, jnp.maximum(jet.acceleration, 0.0), jet.acceleration),
             jet.jerk,
         )
-    return Passed(jets, slides, stuck)
+    return Passed(jets, slides, stuck, passed_over)
 
 
 def _seen_again(carried: LoopState, jets) -> LoopState:

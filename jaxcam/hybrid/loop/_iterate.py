@@ -14,13 +14,13 @@ import jax.numpy as jnp
 from ..breakpoints import after
 from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
-from ._crossing import jumped_across, of_constraints, refreshed
+from ._crossing import jumped_across, of_constraints, refreshed, stopped_by_impacts
 from ._flight import earliest, judge, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._jam import Jam, jam_of_step, jams_after
 from ._landing import land, Landing
-from ._loop_state import LoopState
+from ._loop_state import COMPLETED, LoopState
 from ._release import judge_contact, lets_go_before
 from ._row_kind import at_section, kind_of_switch, row_kind
 from ._select import any_of, of_constraint, select
@@ -56,6 +56,8 @@ class Judged(NamedTuple):
     # largest gap that contact has suppressed; resolution of a zero gap there
     held: list
     tiny: list
+    # for each surface, whether sliding begins at once: see `stopped_by_impacts`
+    stops: list
 
 
 def iteration(
@@ -78,7 +80,9 @@ def _iterate(
         carried, made = refreshed(carried, made)
     judged = _judge_flights(functions, plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
-    landing = land(functions, plan, carried, end, made, lands, flown, rounding)
+    landing = land(
+        functions, plan, carried, end, made, lands, flown, rounding, judged.stops
+    )
     chatter, begins = landing.chatter, landing.begins
 
     # contact: the state is moved onto the surface a second time, then checked
@@ -207,8 +211,9 @@ def _judge_flights(
         )
         for k, jet in enumerate(jets)
     ]
+    stops = stopped_by_impacts(functions, carried) if carried.crossed else []
     if carried.crossed:
-        verdicts = jumped_across(carried, verdicts, h)
+        verdicts = jumped_across(carried, verdicts, h, stops)
     flown = earliest(verdicts)
     natural = jnp.minimum(carried.longest, plan.longest_step)
     # the motion suppressed by the multipliers counts as gap, since rounding is relative
@@ -226,7 +231,7 @@ def _judge_flights(
     behind = of_constraint([j.gap for j in jets], flown.constraint)
     over = waits & (behind < -of_constraint(slack, flown.constraint))
     good = fits & ~flown.retake & ~over & active
-    return Judged(flown, lands, good, over, natural, held, tiny)
+    return Judged(flown, lands, good, over, natural, held, tiny, stops)
 
 
 def _judge_contacts(
@@ -274,7 +279,8 @@ def _stale(carried, landing: Landing, released) -> tuple:
     """Return whether the jets are not those of the new mode: see `LoopState`."""
     if not carried.stale:
         return ()
-    return (jnp.where(landing.slides, 2.0, jnp.where(released, 1.0, 0.0)),)
+    after = jnp.where(released, 1.0, jnp.where(carried.completing, COMPLETED, 0.0))
+    return (jnp.where(landing.slides, 2.0, after),)
 
 
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):

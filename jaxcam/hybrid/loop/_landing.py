@@ -63,8 +63,12 @@ def land(
     lands,
     flown: StepVerdict,
     rounding,
+    stops,
 ) -> Landing:
-    """Return the state after the impact if the step `lands`, otherwise at its end."""
+    """Return the state after the impact if the step `lands`, otherwise at its end.
+
+    **Arguments:** `stops` tells on which surfaces sliding begins at once.
+    """
     no = jnp.asarray(False)
     offset = jnp.where(lands, flown.offset, 0.0)
     landed = taylor(made.x, made.rates, offset)
@@ -95,11 +99,16 @@ def land(
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
         mode = mode + sides.negative + sides.sliding
         jets = functions.jets(seen, x, mode)
-        passed = past_surfaces(functions, carried, jets, hit, sides, approach, rounding)
+        passed = past_surfaces(
+            functions, carried, jets, hit, sides, approach, rounding, stops
+        )
         jets, stuck = passed.jets, passed.stuck
         slides, leaves = any_of(passed.slides), any_of(sides.leaves)
         flags = zip(mode[number:], passed.slides, strict=True)
         mode = mode[:number] + tuple(a | b for a, b in flags)
+        if functions.m and functions.slidable:
+            moved, _ = functions.settled(seen, x, mode)
+            x = select(passed.passed_over, moved, x)
     else:
         jets = functions.jets(seen, x, mode)
 

@@ -14,6 +14,13 @@ from ._select import any_of, select
 from ._start import first_sides, first_status
 
 
+# the flag `stale` after the rest of a chatter
+COMPLETED = 1.5
+# part of the longest step over which a motion that starts on a surface gives its
+# distance a size
+_PART = 1e-6
+
+
 class LoopState(NamedTuple):
     """The loop state as scalars, so that a batch is a set of plain vectors."""
 
@@ -47,7 +54,8 @@ class LoopState(NamedTuple):
     # for a Poincaré section: number of crossings
     points: tuple
     # for surfaces along which a motion can slide: the mode has changed since the jets
-    # were computed, and those of surfaces (1) or of constraints as well (2) are old
+    # were computed, and those of surfaces (1) or of constraints as well (2) are old;
+    # `COMPLETED` (surfaces only) after the rest of a chatter
     stale: tuple
     # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
@@ -156,6 +164,11 @@ def first_state(
                 jet.jerk,
             )
         )
+    if m and functions.slidable:
+        # contact forces and their friction also hold the motion on a surface
+        found = first_sides(functions, t0, x, tuple(contact))
+        sides, crossings, slides, stuck = found
+        status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
     longest = jnp.minimum((t1 - t0) / 64, longest)
     # in contact, the error estimate may be uninformative, so the step length is limited
     held = any_of(contact)
@@ -179,7 +192,7 @@ def first_state(
         locating=jnp.asarray(False),
         stops=0.0 * one,
         fastest=0.0 * one,
-        scale=tuple(jnp.abs(j.gap) for j in settled),
+        scale=_first_scale(settled, m, longest),
         blur=tuple(map(jax.lax.stop_gradient, functions.blur(t0, x, extents, mode))),
         held=(0.0 * one,) * m,
         struck=(-jnp.inf * one,) * m if m > 1 else (),
@@ -198,6 +211,18 @@ def first_state(
         impacts=0.0 * one,
         chatters=0.0 * one,
     )
+
+
+def _first_scale(jets, m: int, longest) -> tuple:
+    """Return the first sizes of the gaps, and of the distances of surfaces.
+
+    A distance that is zero from the start, as of a body that sticks, still has a size:
+    that of a motion off the surface over a small part of the longest step.
+    """
+    moves = [jnp.abs(j.velocity) * longest * _PART for j in jets[m:]]
+    sizes = [jnp.abs(jet.gap) for jet in jets]
+    far = [jnp.maximum(a, b) for a, b in zip(sizes[m:], moves, strict=True)]
+    return tuple(map(jax.lax.stop_gradient, [*sizes[:m], *far]))
 
 
 def _presses(jet: Jet, tiny):

@@ -137,15 +137,15 @@ def slide_terms(mode: InMode, t, x) -> SlideTerms:
         changes = jnp.stack([each.multipliers - multipliers for each in forces])
         least = _UNDONE * largest
         gains = gradient @ kicks.T
-    slopes, own_gains = drift + gradient @ field, _own(gains)
-    largest = jnp.maximum(jnp.abs(own_gains), jnp.abs(slopes))
+    slopes, returns = drift + gradient @ field, _returns(mode, gains, least)
+    largest = jnp.maximum(jnp.abs(_own(gains)), jnp.abs(slopes))
     still = (least > 0) & (largest <= least)
     return SlideTerms(
         values,
         slopes,
         kicks,
         gains,
-        own_gains > least,
+        returns > least,
         still,
         field,
         multipliers,
@@ -156,6 +156,23 @@ def slide_terms(mode: InMode, t, x) -> SlideTerms:
 def _own(gains: Float[Array, "K K"]) -> Float[Array, " K"]:
     """Return the diagonal."""
     return jnp.stack([gains[k, k] for k in range(len(gains))])
+
+
+def _returns(mode: InMode, gains: Float[Array, "K K"], least) -> Float[Array, " K"]:
+    """Return the change of the rate of each height by its own side.
+
+    If it is not above `least`, the change while the motion slides on the others: their
+    sides may drive it back instead.
+    """
+    own, number = _own(gains), len(gains)
+    if number == 1:
+        return own
+    others, found = _slides_on(mode) & (own > least), []
+    for k in range(number):
+        kept = solve_masked(gains, gains[:, k], others)
+        rest = own[k] - jnp.sum(jnp.where(others, gains[k] * kept, 0.0))
+        found.append(jnp.where(own[k] > least[k], own[k], rest))
+    return jnp.stack(found)
 
 
 def _only(changed: tuple[int, ...], change: State) -> State:
@@ -241,14 +258,19 @@ def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
 
 def open_surfaces(mode: InMode, t, x) -> tuple:
     """Return distance and three rates of each surface, shape `(k, 4)`, and the rounding
-    error of the distance, `(k,)`, for a motion without contacts that does not slide.
+    error of the distance, `(k,)`, for a motion that does not slide.
     """
     side = OnSides(mode.system, mode.negative)
+
+    def field(s, y):
+        if not mode.contact.shape[0] or not mode.slidable:
+            return side.vector_field(s, y)
+        return contact_forces(side, s, y, mode.contact)[1]
 
     def distance(s, y):
         return mode.signs * surfaces(mode.system, s, y) + mode.system.hysteresis
 
-    rates = motion_rates(side.vector_field, t, x)
+    rates = motion_rates(field, t, x)
     jets = jnp.stack(along_path(distance, t, x, rates, 3), axis=1)
     return jets, rounding_of(distance, t, x, jnp.abs(x))
 
