@@ -40,6 +40,7 @@ MACHINES = {
     "friction, two masses": Shape(2, 2, 0),
     "friction and stop": Shape(2, 2, 1),
     "friction and impacts": Shape(2, 2, 0, wall=True),
+    "friction beside impacts": Shape(2, 1, 0, wall=True),
     "stop and impacts": Shape(1, 0, 1, wall=True),
 }
 FAMILIES = (*MACHINES, "relays", "shaken contact")
@@ -73,9 +74,9 @@ def _machine(rng, family: str, shape: Shape) -> Problem:
     state = np.concatenate([rng.normal(size=d), rng.normal(size=d)])
     if shape.rubs and rng.random() < 0.25:
         # it sticks at the start, or slips from rest
-        state[d:] = np.linalg.solve(values["slips"], values["belts"])
+        state[d:] = np.linalg.pinv(values["slips"]) @ values["belts"]
         state[:d] *= 0.3
-    ends = shape.wall and shape.rubs > 0
+    ends = shape.wall and bool(np.any(values["slips"][:, 0]))
     if shape.wall:
         values["wall"] = np.asarray(rng.uniform(-0.3, 1.0))
         values["restitution"] = np.asarray(rng.choice([0.0, rng.uniform(0.05, 0.8)]))
@@ -104,9 +105,9 @@ def _springs(rng, d: int) -> dict:
 
 
 def _friction(rng, shape: Shape) -> dict:
-    """Friction on ground and belts, or between the first two masses."""
+    """Friction on ground and belts, or between the two masses."""
     d, f = shape.masses, shape.rubs
-    slips = np.eye(d)[:f]
+    slips = np.eye(d)[d - f :]
     if f == 2 and rng.random() < 0.3:
         slips = np.array([[1.0, 0.0], [-1.0, 1.0]])
     return dict(

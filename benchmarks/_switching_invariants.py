@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._switching_draw import Problem
-from ._switching_linear import law, Mode
+from ._switching_linear import law, Law, Linear, Mode
 
 
 # permitted excess of the friction force, and rise of the energy, relative to their size
@@ -20,16 +20,19 @@ def broken(problem: Problem, run, end: float) -> str:
     if not np.all(np.isfinite(states)):
         return "a state is not finite"
     known = times < end
-    said = _cone(problem, times[known], states[known], sides[known], contact[known])
+    times, states, sides = times[known], states[known], sides[known]
+    said = _cone(problem, run, times, states, sides, contact[known])
     if not said and problem.energy is not None:
-        said = _rise(problem, times[known], states[known])
+        said = _rise(problem, times, states)
     return said
 
 
-def _cone(problem: Problem, times, states, sides, contact) -> str:
+def _cone(problem: Problem, run, times, states, sides, contact) -> str:
     """A point at which the force that holds a surface exceeds its limit."""
     linear, laws = problem.linear, {}
-    for i in np.flatnonzero(np.any(sides == 0, axis=1)):
+    jumps = set(np.asarray(run.impacts.time).tolist())
+    lasts = np.append(np.diff(times) > 0, False)
+    for i in np.flatnonzero(np.any(sides == 0, axis=1) & lasts):
         held = tuple(bool(b) for b in sides[i] == 0)
         mode = Mode(
             tuple(int(s) if s else 1 for s in sides[i]),
@@ -40,18 +43,25 @@ def _cone(problem: Problem, times, states, sides, contact) -> str:
             return f"t = {times[i]:.9g}: sticks without contact"
         if mode not in laws:
             laws[mode] = law(linear, mode)
-        rules, z = laws[mode], linear.extended(states[i], times[i])
-        size = 1 + np.max(np.abs(states[i]))
-        for k in rules.needed:
-            needed, limit = abs(rules.needed[k] @ z), rules.limit[k] @ z
-            if needed > limit + _OUTSIDE * size:
-                return (
-                    f"t = {times[i]:.9g}: surface {k} is held by {needed:.9g}, more "
-                    f"than {limit:.9g}"
-                )
-            slip = abs(linear.rows[k] @ z)
-            if slip > _OUTSIDE * size:
-                return f"t = {times[i]:.9g}: surface {k} slips by {slip:.1e}"
+        for j in (i, i + 1):
+            said = _held(linear, laws[mode], times[j], states[j])
+            if said and times[j] not in jumps:
+                return said
+    return ""
+
+
+def _held(linear: Linear, rules: Law, t: float, x) -> str:
+    """What holds a surface beyond its limit, or slips, at one point."""
+    z, size = linear.extended(x, t), 1 + np.max(np.abs(x))
+    for k in rules.needed:
+        needed, limit = abs(rules.needed[k] @ z), rules.limit[k] @ z
+        if needed > limit + _OUTSIDE * size:
+            what = f"is held by {needed:.9g}, more than {limit:.9g}"
+        elif abs(linear.rows[k] @ z) > _OUTSIDE * size:
+            what = f"slips by {abs(linear.rows[k] @ z):.1e}"
+        else:
+            continue
+        return f"t = {t:.9g}: surface {k} {what}"
     return ""
 
 

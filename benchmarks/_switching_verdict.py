@@ -57,19 +57,23 @@ class Known(NamedTuple):
 def know(problem: Problem) -> Known:
     """The exact motion of a problem, and up to where it is known."""
     programs = Programs(problem.linear)
+    why=''
     exact = motion(programs, problem.state, problem.span, ends=problem.ends)
-    events = listed(exact.events, exact)
+    events = listed(exact.events)
     end, growth, ambiguous = exact.end, np.ones(len(events) + 1), False
+    if exact.reason:
+        end -= _LATE
     for seed in (1, 2):
         noise = np.random.default_rng(seed)
         other = motion(programs, problem.state, problem.span, noise, problem.ends)
-        others = listed(other.events, exact)
+        others = listed(other.events)
         for i in range(max(len(events), len(others))):
             pair = events[i : i + 1] + others[i : i + 1]
             if len(pair) < 2 or pair[0][1:3] != pair[1][1:3]:
                 first = min(e.time for e in pair)
                 if first < end:
                     end, ambiguous = first - 1e-6, True
+                    why = f"grazes: {_said(pair[:1])}, {_said(pair[1:])}"
                 break
             one, two = pair
             apart = max(abs(one.time - two.time), _distance(one.state, two.state))
@@ -80,21 +84,23 @@ def know(problem: Problem) -> Known:
     lost = [e.time for e, g in zip(events, growth, strict=False) if g > _LOST]
     if lost and lost[0] <= end:
         end, ambiguous = lost[0] - 1e-6, True
+        why = "grows"
+    print(why)
     return Known(exact, events, end, growth, ambiguous)
 
 
-def listed(events: list[Event], exact: Exact) -> list[Event]:
+def listed(events: list[Event]) -> list[Event]:
     """The events that both programs list: not those at the start, and not the last
     impacts before a constraint closes.
     """
-    closed = [(e.time, e.which) for e in exact.events if e.kind == CLOSES]
+    closed = [(e.time, e.which) for e in events if e.kind == CLOSES]
     return [
         e
         for e in events
         if e.time > 0
         and not (
             e.kind == HITS
-            and any(0 < t - e.time < _LATE for t, k in closed if k == e.which)
+            and any(0 <= t - e.time < _LATE for t, k in closed if k == e.which)
         )
     ]
 
@@ -118,7 +124,7 @@ def judge(problem: Problem, known: Known, settings: Settings = SETTINGS) -> Verd
     if said:
         return wrong(said)
     mine = [e for e in known.events if e.time < end]
-    theirs = [e for e in listed(events_of(run, exact), exact) if e.time < end]
+    theirs = [e for e in listed(events_of(run)) if e.time < end]
     error = worst = 0.0
     for count, growth in enumerate(known.growth[: max(len(mine), len(theirs))]):
         pair = mine[count : count + 1], theirs[count : count + 1]
@@ -139,7 +145,7 @@ def judge(problem: Problem, known: Known, settings: Settings = SETTINGS) -> Verd
     return Verdict(label, exact.reason, compared, count, error, worst)
 
 
-def events_of(run, exact: Exact) -> list[Event]:
+def events_of(run) -> list[Event]:
     """The events of a run of jaxcam; crossings by the jump of an impact are none."""
     hits, rests, switches = run.impacts, run.contacts, run.switches
     found = [
