@@ -36,6 +36,13 @@ class Event(NamedTuple):
     speed: float = 0.0
 
 
+class Noise(NamedTuple):
+    """Random changes of the state."""
+
+    rng: np.random.Generator
+    size: float
+
+
 class Exact(NamedTuple):
     """A motion up to the time at which it is known."""
 
@@ -63,11 +70,11 @@ class Programs:
         return self.grid(mode).law
 
 
-def motion(programs: Programs, state, span: float, noise=None, ends=False) -> Exact:
+def motion(programs: Programs, state, span: float, noise: Noise | None = None, ends=False) -> Exact:
     """The motion from a state at time 0.
 
-    `noise` is a random generator: then the start, and the state after each event, are
-    moved by about 1e-8 within the surfaces on which the motion is. With `ends`, the
+    With `noise`, the state is moved at random after the start and after each event,
+    within the surfaces on which the motion is. With `ends`, the
     motion is not followed beyond impacts that accumulate.
     """
     loop = _Loop(programs, np.array(state, float), noise, ends)
@@ -96,7 +103,7 @@ class _Loop:
         )
         for i in np.flatnonzero(np.abs(heights) < _STOPPED):
             if self.system.width[i] == 0:
-                self._arrive(int(i), listed=True)
+                self._arrive(int(i), started=True)
 
     @property
     def z(self):
@@ -129,10 +136,10 @@ class _Loop:
             self.reason = "events accumulate"
 
     def _shaken(self, z):
-        """Move z by about 1e-8, but not off the surfaces on which the motion is."""
+        """Move z at random, but not off the surfaces on which the motion is."""
         n, system = len(self.x), self.system
         z = z.copy()
-        z[:n] += 1e-8 * self.noise.normal(size=n)
+        z[:n] += self.noise.size * self.noise.rng.normal(size=n)
         speeds = system.speed_rows()
         held = [system.gaps[j] for j, on in enumerate(self.mode.contact) if on]
         held += [speeds[j] for j, on in enumerate(self.mode.contact) if on]
@@ -144,7 +151,7 @@ class _Loop:
 
     def _handle(self, name: str, k: int):
         if name == "side":
-            self._arrive(k, listed=True)
+            self._arrive(k)
         elif name in ("upper", "lower"):
             self._leave(k, 1 if name == "upper" else -1)
         elif name == "gap":
@@ -154,14 +161,19 @@ class _Loop:
             self.mode = self.mode._replace(contact=contact)
             self.zeros["gap", k] = 3
             self._log(OPENS, k)
-            self._rest_in_flight()
+            if self.system.rubs and self.mode.sliding[0]:
+                # nothing holds the slip in flight
+                self._stop()
             self._recheck()
 
     def _log(self, kind, k, speed=0.0):
         self.events.append(Event(self.t, kind, k, self.x.copy(), speed))
 
-    def _arrive(self, k: int, listed: bool):
-        """Slide along the surface that the motion has reached, or cross it."""
+    def _arrive(self, k: int, started=False):
+        """Slide along the surface that the motion has reached, or cross it.
+
+        If it is `started` on the surface, it continues on the side that it enters.
+        """
         mode, system = self.mode, self.system
         if self._can_slide(k):
             held = mode._replace(sliding=_changed(mode.sliding, k, True))
@@ -169,18 +181,14 @@ class _Loop:
             z = self._projected(k)
             if abs(rules.needed[k] @ z) <= rules.limit[k] @ z:
                 self.mode, self.x = held, z[: len(self.x)]
-                if listed:
-                    self._log(SLIDES, k)
+                self._log(SLIDES, k)
                 self._recheck()
                 return
-        side = -mode.sides[k]
-        started = not self.events and self.t == 0.0
-        if started or not listed:
-            side = self._entered(k)
+        side = self._entered(k) if started else -mode.sides[k]
         self.mode = mode._replace(sides=_changed(mode.sides, k, side))
         if system.width[k] == 0:
             self.zeros["side", k] = 1
-        if listed and not started:
+        if not started:
             self._log(CROSSES, k)
         self._recheck()
 
@@ -222,14 +230,6 @@ class _Loop:
                 self._leave(k, 1 if rules.needed[k] @ z > 0 else -1)
                 return
 
-    def _rest_in_flight(self):
-        """Without contact, nothing holds the slip of a surface with contact friction."""
-        if self.system.rubs and self.mode.sliding[0] and not any(self.mode.contact):
-            self.mode = self.mode._replace(
-                sliding=_changed(self.mode.sliding, 0, False)
-            )
-            self._arrive(0, listed=False)
-
     def _impact(self, j: int):
         system, n = self.system, len(self.x)
         row = system.speed_rows()[j]
@@ -263,7 +263,7 @@ class _Loop:
         if self.ends:
             self.reason = "in contact"
         if stops:
-            self._arrive(0, listed=True)
+            self._stop()
         self._recheck()
 
     def _after_jump(self, stops: bool):
@@ -277,10 +277,14 @@ class _Loop:
                 sides[k], sliding[k] = 1 if height > 0 else -1, False
         self.mode = Mode(tuple(sides), tuple(sliding), self.mode.contact)
         if stops:
-            # it flies from the impact without slip
-            self.mode = self.mode._replace(sliding=_changed(self.mode.sliding, 0, False))
-            self._arrive(0, listed=False)
+            self._stop()
         self._recheck()
+
+    def _stop(self):
+        """Hold the slip that an impact has stopped, or let it begin again."""
+        free = _changed(self.mode.sliding, 0, False)
+        self.mode = self.mode._replace(sliding=free)
+        self._arrive(0, started=True)
 
 
 def _changed(flags: tuple, k: int, value) -> tuple:

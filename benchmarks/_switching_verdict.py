@@ -16,7 +16,7 @@ import jaxcam
 from jaxcam.hybrid import Settings
 
 from ._switching_draw import Problem
-from ._switching_exact import CLOSES, CROSSES, Event, Exact, HITS, motion, OPENS, Programs
+from ._switching_exact import CLOSES, CROSSES, Event, Exact, HITS, motion, Noise, OPENS, Programs
 from ._switching_invariants import broken
 
 
@@ -26,6 +26,8 @@ SETTINGS = Settings(tolerance=1e-12)
 _NOISE, _LOST = 1e-8, 1e4
 # impacts this close to the end of their sequence are not compared
 _LATE = 1e-3
+# events closer to each other than this are simultaneous
+_SAME = 1e-10
 
 
 class Verdict(NamedTuple):
@@ -63,8 +65,8 @@ def know(problem: Problem) -> Known:
     end, growth, ambiguous = exact.end, np.ones(len(events) + 1), False
     if exact.reason:
         end -= _LATE
-    for seed in (1, 2):
-        noise = np.random.default_rng(seed)
+    for sign in (1, -1):
+        noise = Noise(np.random.default_rng(0), sign * _NOISE)
         other = motion(programs, problem.state, problem.span, noise, problem.ends)
         others = listed(other.events)
         for i in range(max(len(events), len(others))):
@@ -85,7 +87,6 @@ def know(problem: Problem) -> Known:
     if lost and lost[0] <= end:
         end, ambiguous = lost[0] - 1e-6, True
         why = "grows"
-    print(why)
     return Known(exact, events, end, growth, ambiguous)
 
 
@@ -94,15 +95,20 @@ def listed(events: list[Event]) -> list[Event]:
     impacts before a constraint closes.
     """
     closed = [(e.time, e.which) for e in events if e.kind == CLOSES]
-    return [
+    found = [
         e
         for e in events
-        if e.time > 0
+        if e.time > _SAME
         and not (
             e.kind == HITS
-            and any(0 <= t - e.time < _LATE for t, k in closed if k == e.which)
+            and any(-_SAME < t - e.time < _LATE for t, k in closed if k == e.which)
         )
     ]
+    # simultaneous events may come in any order
+    for i in range(1, len(found)):
+        while i and found[i].time - found[i - 1].time < _SAME and found[i][1:3] < found[i - 1][1:3]:
+            found[i - 1], found[i], i = found[i], found[i - 1], i - 1
+    return found
 
 
 def judge(problem: Problem, known: Known, settings: Settings = SETTINGS) -> Verdict:
@@ -158,7 +164,7 @@ def events_of(run) -> list[Event]:
             strict=True,
         )
     ]
-    jumps = {e.time for e in found}
+    jumps = np.array([e.time for e in found])
     for t, kind, k, x in zip(
         np.asarray(switches.time),
         np.asarray(switches.kind),
@@ -166,7 +172,7 @@ def events_of(run) -> list[Event]:
         np.asarray(switches.after),
         strict=True,
     ):
-        if not (kind == CROSSES and float(t) in jumps):
+        if kind != CROSSES or np.min(np.abs(jumps - t), initial=1.0) > _SAME:
             found.append(Event(float(t), int(kind), int(k), x))
     for start, stop, k, free in zip(
         rests.start, rests.end, rests.constraint, rests.released, strict=True
@@ -175,8 +181,7 @@ def events_of(run) -> list[Event]:
         if free:
             at = np.asarray(run.at(np.asarray([stop])))[0]
             found.append(Event(float(stop), OPENS, int(k), at))
-    order = {CLOSES: 1}
-    return sorted(found, key=lambda e: (e.time, order.get(e.kind, 0)))
+    return sorted(found, key=lambda e: e.time)
 
 
 def _distance(one, other) -> float:
