@@ -119,7 +119,11 @@ class _Loop:
         """Advance to the next event or to the end."""
         grid = self.programs.grid(self.mode)
         names = grid.law.names
-        zeros = {names.index(key): v for key, v in self.zeros.items() if key in names}
+        zeros = {
+            names.index(key): self._order(grid.law, names.index(key), order)
+            for key, order in self.zeros.items()
+            if key in names
+        }
         shaken = None if self.noise is None else self._shaken
         fall = first_fall(grid, self.z, zeros, span - self.t, shaken)
         last, self.t = self.t, self.t + fall.after
@@ -134,6 +138,11 @@ class _Loop:
         self.crowd = self.crowd + 1 if quick else 0
         if self.crowd > _CROWD or len(self.events) > _MOST_EVENTS:
             self.reason = "events accumulate"
+
+    def _order(self, rules: Law, guard: int, order: int) -> int:
+        """The derivatives of a guard that are zero, after all simultaneous events."""
+        rate = rules.guards[guard] @ rules.matrix @ self.z
+        return 1 if order == 2 and abs(rate) > 1e-9 else order
 
     def _shaken(self, z):
         """Move z at random, but not off the surfaces on which the motion is."""
