@@ -25,7 +25,7 @@ class Problem(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """Numbers of masses, friction forces and soft stops, and whether there is a wall."""
+    """Numbers of masses, friction forces and soft stops; whether there is a wall."""
 
     masses: int
     rubs: int
@@ -205,7 +205,7 @@ def _relays(rng) -> Problem:
         levels=0.3 * rng.normal(size=k),
         width=width,
     )
-    one, cosine = np.eye(n + 3)[n], np.eye(n + 3)[n + 1]
+    one = np.eye(n + 3)[n]
     field = np.zeros((n, n + 3))
     field[:, :n], field[:, n] = values["matrix"], values["force"]
     field[:, n + 1] = values["drive"]
@@ -224,7 +224,6 @@ def _relays(rng) -> Problem:
         normals=np.zeros((0, n)),
         restitution=np.zeros(0),
     )
-    del cosine
     system, state = _arrays(Relay, values), rng.normal(size=n)
     span = rng.uniform(8.0, 20.0)
     return Problem("relays", system, linear, state, span, None, False)

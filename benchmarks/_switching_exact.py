@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._switching_linear import law, Law, Linear, Mode
+from ._switching_linear import Law, law, Linear, Mode
 from ._switching_search import first_fall, Grid
 
 
@@ -70,7 +70,9 @@ class Programs:
         return self.grid(mode).law
 
 
-def motion(programs: Programs, state, span: float, noise: Noise | None = None, ends=False) -> Exact:
+def motion(
+    programs: Programs, state, span: float, noise: Noise | None = None, ends=False
+) -> Exact:
     """The motion from a state at time 0.
 
     With `noise`, the state is moved at random after the start and after each event,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._switching_draw import Problem
-from ._switching_linear import law, Law, Linear, Mode
+from ._switching_linear import Law, law, Linear, Mode
 
 
 # permitted excess of the friction force, and rise of the energy, relative to their size

@@ -95,7 +95,9 @@ def law(system: Linear, mode: Mode) -> Law:
         ways = np.zeros((size, len(columns)))
         ways[:n] = np.array(columns).T
         speeds = system.speed_rows()
-        held = np.array([speeds[j] for j in contact] + [system.rows[k] for k in sliding])
+        held = np.array(
+            [speeds[j] for j in contact] + [system.rows[k] for k in sliding]
+        )
         solved = np.linalg.solve(held @ ways, -held @ system.whole(field))
         field = field + ways[:n] @ solved
     forces = dict(zip(contact, solved, strict=False))

@@ -65,8 +65,9 @@ class Grid:
 
     def suspects(self, points) -> np.ndarray:
         """The intervals between `points` in which a guard may fall through zero."""
-        value, slope, bend, jerk = (np.abs(points @ r) if i > 1 else points @ r
-                                    for i, r in enumerate(self.rows))
+        value, slope, bend, jerk = (
+            np.abs(points @ r) if i > 1 else points @ r for i, r in enumerate(self.rows)
+        )
         del slope
         bent = np.maximum(bend[:-1], bend[1:]) + 0.5 * np.maximum(jerk[:-1], jerk[1:])
         least = np.minimum(value[:-1], value[1:]) - bent / 8

@@ -90,7 +90,9 @@ class Relay(SwitchedSystem):
 
     def branch(self, t, state, sides):
         turn = jnp.cos(self.omega * t + self.phase)
-        return self.matrix @ state + self.force + self.drive * turn + sides @ self.pushes
+        return (
+            self.matrix @ state + self.force + self.drive * turn + sides @ self.pushes
+        )
 
     @property
     def hysteresis(self):

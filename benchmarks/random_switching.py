@@ -35,7 +35,7 @@ def verdict_of(seed: int, settings: Settings = SETTINGS) -> Verdict:
 
 def table(found: dict[str, list[Verdict]]) -> str:
     """The results of each family."""
-    columns = "systems", "agree", "graze", "disagree", "events", "compared", "error", "of allowed"
+    columns = "systems agree graze disagree events compared error allowed".split()
     lines = [f"{'family':22s}" + "".join(f"{c:>11s}" for c in columns)]
     whole = [v for each in found.values() for v in each]
     for family, verdicts in [*found.items(), ("all", whole)]:
