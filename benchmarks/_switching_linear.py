@@ -108,7 +108,7 @@ def law(system: Linear, mode: Mode) -> Law:
         if mode.sliding[k]:
             load = system.loads[k]
             if system.rubs and k == 0:
-                load = system.rubs * forces.get(0, 0 * load)
+                load = system.rubs * forces[0] if 0 in forces else 0 * load
             limit[k] = system.holding[k] * load
             guards += [limit[k] - needed[k], limit[k] + needed[k]]
             names += [("upper", k), ("lower", k)]

@@ -6,7 +6,7 @@ An interval is searched if a guard is negative at its end, or if a bound of the 
 derivative admits a minimum below zero within it.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -19,6 +19,8 @@ from ._switching_linear import Law
 _ANGLE, _POINTS = 0.3, 48
 # terms of the Taylor series; samples of a polynomial in one interval
 _TERMS, _SAMPLES = 22, 9
+# relative error of a root
+_EXACT = np.float64(1e-15)
 _GRID = np.linspace(0.0, 1.0, _SAMPLES)
 _POWERS = np.vander(_GRID, _TERMS, increasing=True)
 _SLOPES = np.zeros_like(_POWERS)
@@ -119,7 +121,11 @@ def _first_root(coefficients, end: float) -> float | None:
 
 
 def _root(down: list, a: float, b: float) -> float:
-    return brentq(lambda s: _value(down, s), a, b, xtol=1e-300, rtol=1e-15)
+    # a value near zero may have either sign, depending on the order of its sum
+    if _value(down, a) * _value(down, b) >= 0:
+        return b
+    found: Any = brentq(lambda s: _value(down, s), a, b, xtol=1e-300, rtol=_EXACT)
+    return found
 
 
 def _value(down: list, s: float) -> float:

@@ -53,7 +53,7 @@ def table(found: dict[str, list[Verdict]]) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--systems", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--seed", type=int, help="run only this seed")
@@ -70,8 +70,8 @@ def main() -> int:
         try:
             verdict = verdict_of(seed, settings)
         except Exception as error:
-            error.add_note(f"the random system of seed {seed}, {family}")
-            raise
+            said = f"raised {type(error).__name__}: {error}".splitlines()[0]
+            verdict = Verdict("DISAGREES", said, 0.0, 0, np.inf, np.inf)
         found.setdefault(family, []).append(verdict)
         if verdict.label == "DISAGREES" or options.seed is not None:
             said = f"seed {seed} ({family}) {verdict.label}: {verdict.what}"
