@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from ._flight import moves_in, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
+from ._hold import held_on
 from ._loop_state import COMPLETED, LoopState
 from ._select import any_of, select
 from ._step import Step
@@ -14,6 +15,8 @@ from ._step import Step
 
 # distance after a crossing, over the largest so far, that is the error of its location
 _NEAR = 1e-9
+# fraction of the longest step in which a motion off the surface may return
+_SHORT = 1e-3
 # acceleration off a constraint, relative to that before the motion slid, that is
 # rounding
 _ZERO = 1e-11
@@ -58,10 +61,8 @@ def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h, stops):
 
 
 def stopped_by_impacts(functions: Functions, carried: LoopState) -> list:
-    """Return for each surface whether the motion slides along it once contact begins.
-
-    Impacts can stop the slip before static friction has to hold it. Then the weights of
-    the branches must be within the limits of sliding.
+    """Return for each surface whether the motion slides along it once contact begins,
+    because the impacts have stopped the slip.
     """
     flags = [jnp.asarray(False) for _ in range(functions.k)]
     if not (functions.m and functions.slidable):
@@ -72,19 +73,21 @@ def stopped_by_impacts(functions: Functions, carried: LoopState) -> list:
         flags[k] = now & near & ~carried.sliding[k]
     pairs = zip(carried.sliding, flags, strict=True)
     trial = (*carried.mode[: len(carried.jets)], *(a | b for a, b in pairs))
-    shares = functions.shares(carried.t, carried.x, trial)
-    slack = functions.slack(carried.mode)
-    for k in functions.slidable:
-        inside = (shares[k] + slack[k]) * (1 + slack[k] - shares[k]) >= 0
-        # no side drives the motion back to a surface without a weight
-        flags[k] = flags[k] & inside & (shares[k] != 0)
-    return flags
+    held = held_on(functions, carried.t, carried.x, trial)
+    return [a & b for a, b in zip(flags, held, strict=True)]
 
 
 def _near(carried: LoopState, k: int):
     """Return the distance from a surface up to which the state is on it."""
     row = len(carried.held) + k
-    return _NEAR * carried.scale[row] + 4 * carried.blur[row]
+    return _NEAR * _size(carried, k) + 4 * carried.blur[row]
+
+
+def _size(carried: LoopState, k: int):
+    """Return the largest distance of a surface so far, or after a first short step."""
+    row = len(carried.held) + k
+    step = jnp.abs(carried.jets[row].velocity) * carried.longest
+    return jnp.maximum(carried.scale[row], _SHORT * step)
 
 
 def sides_after(
@@ -110,7 +113,7 @@ def sides_after(
         slid = sliding[k]
         leaves[k] = crossed & slid
         turns = jnp.where(slid, shares[k] > 0.5, True)
-        near = _NEAR * carried.scale[functions.m + k] + 500 * blur[k]
+        near = _NEAR * _size(carried, k) + 500 * blur[k]
         thrown = lands & ~crossed & slid & (jnp.abs(heights[k]) > near)
         negative[k] = jnp.where(thrown, heights[k] < 0, negative[k] ^ (crossed & turns))
         sliding[k] = slid & ~leaves[k] & ~thrown

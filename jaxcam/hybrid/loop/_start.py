@@ -7,6 +7,7 @@ from ..surface import gaps, least_gaps
 from ._flight import moves_in
 from ._functions import Functions
 from ._gap_polynomial import Jet
+from ._hold import held_on
 from ._select import any_of
 
 
@@ -44,6 +45,7 @@ def first_sides(functions: Functions, t, x, contact):
     sides = list(functions.sides(t, x))
     free = (jnp.asarray(False),) * functions.k
     slides, stuck = list(free), jnp.asarray(False)
+    touched = list(free)
 
     def jet_of(k, flag):
         """Return the jet of a surface on one of its sides, and whether x is on it."""
@@ -57,6 +59,7 @@ def first_sides(functions: Functions, t, x, contact):
     for k, flag in enumerate(sides):
         own, _, leaves = jet_of(k, flag)
         other, on, back = jet_of(k, ~flag)
+        touched[k] = on
         if k in functions.slidable:
             slack = functions.slack((*contact, *sides, *free))[k]
             # both branches together, and the most that the stronger hold leaves of it
@@ -67,5 +70,22 @@ def first_sides(functions: Functions, t, x, contact):
         else:
             stuck = stuck | (leaves & on & back)
         sides[k] = flag ^ (leaves & ~back)
+    slides = _held_together(functions, t, x, contact, sides, touched, slides)
     jets: list[Jet] = [jet_of(k, flag)[0] for k, flag in enumerate(sides)]
     return (*sides, *slides), jets, any_of(slides), stuck
+
+
+def _held_together(functions: Functions, t, x, contact, sides, touched, slides) -> list:
+    """Return on which surfaces a motion slides at the start.
+
+    Several that are touched may hold the motion together, although it would leave one
+    of them if it slid past the others.
+    """
+    if len(functions.slidable) < 2:
+        return slides
+    trial = list(slides)
+    for k in functions.slidable:
+        trial[k] = touched[k]
+    held = held_on(functions, t, x, (*contact, *sides, *trial))
+    every = ~any_of([a & ~b for a, b in zip(trial, held, strict=True)])
+    return [jnp.where(every, a, b) for a, b in zip(trial, slides, strict=True)]
