@@ -7,6 +7,7 @@ the normal velocity with its coefficient of restitution. Impacts that accumulate
 followed one by one until their speed is below 1e-12; then the constraint is closed.
 """
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -103,9 +104,15 @@ class _Loop:
             sides=tuple(1 if h >= 0 else -1 for h in heights),
             contact=self._resting(z),
         )
-        for i in np.flatnonzero(np.abs(heights) < _STOPPED):
-            if self.system.width[i] == 0:
-                self._arrive(int(i), started=True)
+        near = np.flatnonzero(np.abs(heights) < _STOPPED)
+        touched = [int(i) for i in near if self.system.width[i] == 0]
+        if len(touched) > 1:
+            if np.any(heights[touched] != 0):
+                self.reason = "starts on several surfaces, but for rounding"
+                return
+            self._begin(touched)
+        elif touched:
+            self._arrive(touched[0], started=True)
 
     @property
     def z(self):
@@ -202,6 +209,45 @@ class _Loop:
         if not started:
             self._log(CROSSES, k)
         self._recheck()
+
+    def _begin(self, touched: list[int]):
+        """Slide from the start on as many of the touched surfaces as possible.
+
+        On the others, the motion enters a side. Several ways to do so are several
+        motions.
+        """
+        able = [k for k in touched if self._can_slide(k)]
+        for number in range(len(able), -1, -1):
+            found = []
+            for held in itertools.combinations(able, number):
+                others = [k for k in touched if k not in held]
+                for signs in itertools.product((1, -1), repeat=len(others)):
+                    mode = self.mode
+                    for k in held:
+                        sliding = _changed(mode.sliding, k, True)
+                        mode = mode._replace(sliding=sliding)
+                    for k, side in zip(others, signs, strict=True):
+                        mode = mode._replace(sides=_changed(mode.sides, k, side))
+                    if self._possible(mode, held, others):
+                        found.append((mode, held, others))
+            if found:
+                break
+        if len(found) != 1:
+            self.reason = "several motions from the start"
+            return
+        ((self.mode, held, others),) = found
+        for k in held:
+            self.x = self._projected(k)[: len(self.x)]
+            self._log(SLIDES, k)
+        for k in others:
+            self.zeros["side", k] = 1
+
+    def _possible(self, mode: Mode, held, others) -> bool:
+        """Whether a mode holds and enters the surfaces as it says."""
+        rules, z, rows = self.programs.law(mode), self.z, self.system.rows
+        holds = all(abs(rules.needed[k] @ z) <= rules.limit[k] @ z for k in held)
+        rates = [mode.sides[k] * (rows[k] @ rules.matrix @ z) for k in others]
+        return holds and all(rate > 0 for rate in rates)
 
     def _can_slide(self, k: int) -> bool:
         system = self.system
