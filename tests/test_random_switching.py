@@ -34,6 +34,22 @@ def test_random_systems(family):
     assert sum(v.events for v in verdicts) >= 3
 
 
+ONCE_WRONG = {
+    "a body that has stuck from the start, where another breaks loose": 254,
+    "stick after a first short step": 2052,
+    "static friction in a contact at the start": 2719,
+    "static friction after an impact that stops the slip": 669,
+    "a slip that the rest of a chatter stops": 129,
+    "two relays on which the motion slides": 3538,
+}
+
+
+@pytest.mark.parametrize("seed", ONCE_WRONG.values(), ids=ONCE_WRONG)
+def test_systems_that_were_wrong(seed):
+    verdict = verdict_of(seed)
+    assert verdict.label == "agrees" and verdict.compared > 0.9, verdict
+
+
 @pytest.mark.slow
 def test_more_random_systems():
     """Nearly all of 300, which take half a minute after compilation."""

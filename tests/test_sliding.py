@@ -458,3 +458,27 @@ def test_a_start_where_both_branches_leave_takes_the_given_side():
     run = run_of(Escaping(), [0.0, 0.0], 2.0)
     assert int(run.switches.count) == 0
     assert largest(run.final, [0.6, 0.6]) < 1e-12
+
+
+class Stack(SwitchedSystem):
+    """A light block on another on the ground, with more friction below than between."""
+
+    pull: float = 0.1
+
+    def switching(self, t, state):
+        del t
+        return jnp.stack([state[2], state[3] - state[2]])
+
+    def branch(self, t, state, sides):
+        below, between = 1.0 * sides[0], 0.2 * sides[1]
+        pull = self.pull * t - between
+        return jnp.stack([state[2], state[3], between - below, pull])
+
+
+def test_a_stack_at_rest_stays_at_rest():
+    """The upper block would slip if the lower one did; it slips at 0.1 t = 0.2."""
+    run = run_of(Stack(), np.zeros(4), 3.0)
+    assert run.switches.kind.tolist() == [LEAVES]
+    assert abs(run.switches.time[0] - 2.0) < 1e-12
+    # between - below = 0.2 - 0.2: the lower block does not move
+    np.testing.assert_allclose(run.final, [0.0, 0.05 / 3, 0.0, 0.05], atol=1e-12)
