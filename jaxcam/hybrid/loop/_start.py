@@ -7,7 +7,7 @@ from ..surface import gaps, least_gaps
 from ._flight import moves_in
 from ._functions import Functions
 from ._gap_polynomial import Jet
-from ._hold import held_on
+from ._hold import hold_of
 from ._select import any_of
 
 
@@ -70,22 +70,33 @@ def first_sides(functions: Functions, t, x, contact):
         else:
             stuck = stuck | (leaves & on & back)
         sides[k] = flag ^ (leaves & ~back)
-    slides = _held_together(functions, t, x, contact, sides, touched, slides)
+    sides, slides = _held_together(functions, t, x, contact, sides, touched, slides)
     jets: list[Jet] = [jet_of(k, flag)[0] for k, flag in enumerate(sides)]
     return (*sides, *slides), jets, any_of(slides), stuck
 
 
-def _held_together(functions: Functions, t, x, contact, sides, touched, slides) -> list:
-    """Return on which surfaces a motion slides at the start.
+def _held_together(functions: Functions, t, x, contact, sides, touched, slides):
+    """Return the sides, and the surfaces on which a motion slides at the start.
 
-    Several that are touched may hold the motion together, although it would leave one
-    of them if it slid past the others.
+    Several surfaces that are touched may hold the motion together, although it would
+    leave one of them if it slid past the others. The one that is farthest from holding
+    it lets it go, until the others hold.
     """
     if len(functions.slidable) < 2:
-        return slides
-    trial = list(slides)
+        return sides, slides
+    several = sum(jnp.where(touched[k], 1.0, 0.0) for k in functions.slidable) > 1
+    flags, trial = list(sides), list(slides)
     for k in functions.slidable:
         trial[k] = touched[k]
-    held = held_on(functions, t, x, (*contact, *sides, *trial))
-    every = ~any_of([a & ~b for a, b in zip(trial, held, strict=True)])
-    return [jnp.where(every, a, b) for a, b in zip(trial, slides, strict=True)]
+    for _ in functions.slidable:
+        found = hold_of(functions, t, x, (*contact, *flags, *trial))
+        worst = jnp.max(jnp.stack(found.excess))
+        let_go = (worst > 0) & several
+        for k in functions.slidable:
+            goes = let_go & trial[k] & (found.excess[k] == worst)
+            flags[k] = flags[k] ^ (goes & found.beyond[k])
+            trial[k] = trial[k] & ~goes
+    return (
+        [jnp.where(several, a, b) for a, b in zip(flags, sides, strict=True)],
+        [jnp.where(several, a, b) for a, b in zip(trial, slides, strict=True)],
+    )
