@@ -42,16 +42,18 @@ class Surfaces(NamedTuple):
         return InMode(system, mode.negative, mode.sliding, none, self.jumps)
 
 
-def surfaces_in(system: SwitchedSystem, t, x) -> Surfaces:
+def surfaces_in(system: HybridSystem, t, x) -> Surfaces:
     """Return the number of surfaces, and the components that change at them."""
+    assert isinstance(system, SwitchedSystem)
     values, static = eqx.partition(system, eqx.is_inexact_array)
     shapes, time, state = jax.eval_shape(lambda *a: a, values, t, x)
     number = jax.eval_shape(lambda s, y: surfaces(system, s, y), time, state).shape[0]
     return Surfaces(number, jumping_components(static, shapes, time, state, number))
 
 
-def first_mode(system: SwitchedSystem, t, x) -> Mode:
+def first_mode(system: HybridSystem, t, x) -> Mode:
     """Return the mode in which a motion starts; sliding begins in the first step."""
+    assert isinstance(system, SwitchedSystem)
     negative = system.sides(t, x) < 0
     return Mode(negative, jnp.zeros_like(negative))
 

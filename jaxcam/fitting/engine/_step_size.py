@@ -88,7 +88,7 @@ def _ends(layout: Layout, pieces: Pieces, point: Point, substeps):
     """Return the states at the ends; one program serves every number of substeps."""
 
     def one(model, *piece):
-        return end_of_flight(model, *piece, substeps)
+        return end_of_flight(model, *piece, substeps=substeps)
 
     return _of_each(layout, pieces, point, one)
 

@@ -115,7 +115,8 @@ def switched_nodes(
     starts there), and the maximum number of events.
     """
     steps, mode = _steps(model, state, start, step, drive, mode, events)
-    found = _located(*constant((steps, state, mode)), substeps)
+    fixed, begin, first = constant((steps, state, mode))
+    found = _located(fixed, begin, first, substeps)
     states, rates, end = _integrated(steps, state, _merged(found.parts, steps))
     states = jnp.concatenate([states, end[None]])
     if substeps > 1:

@@ -1,0 +1,69 @@
+"""Diagnoses of a rig with switching surfaces: a cart that sticks, with a soft stop."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_fitting_switched import Cart, SENSORS
+
+from jaxcam.discrepancy import diagnose
+from jaxcam.discrepancy.terms import (
+    Relaxation,
+    system_with_element,
+    system_with_terms,
+)
+from jaxcam.fitting import Model, Parameter, segment_by_model
+from jaxcam.hybrid import simulate
+from jaxcam.recordings import record
+
+
+class Dragged(Cart):
+    """The same with drag that grows with the square of the speed."""
+
+    drag: float = 0.4
+
+    def branch(self, t, state, sides):
+        drag = self.drag * state[1] * jnp.abs(state[1])
+        return super().branch(t, state, sides).at[1].add(-drag)
+
+
+def diagnosis_of(truth):
+    rng = np.random.default_rng(3)
+    runs = [
+        record(truth, SENSORS, 5.0, rng=rng, state=jnp.array([0.0, v]), name=f"v{v}")
+        for v in (0.3, -0.2, 0.4)
+    ]
+    start = Cart(stiffness=60.5, friction=0.58, stop=0.0301, stop_stiffness=1950.0)
+    names = {"stiffness": 2.0, "friction": 0.1, "stop": 1e-3, "stop_stiffness": 200.0}
+    free = [
+        Parameter(name, lambda m, n=name: getattr(m.system, n), tolerance=tolerance)
+        for name, tolerance in names.items()
+    ]
+    parts = segment_by_model(Model(start, SENSORS), runs)
+    return diagnose(start, tuple(parts), sensors=SENSORS, parameters=free)
+
+
+@pytest.mark.slow
+def test_nothing_is_missing_from_a_rig_that_sticks():
+    found = diagnosis_of(Cart())
+    assert found.verdict == "none"
+
+
+@pytest.mark.slow
+def test_drag_is_found_beside_dry_friction():
+    """Its strength to 1 %."""
+    found = diagnosis_of(Dragged())
+    assert found.names == ("quadratic_drag",)
+    (strength,) = found.effects[0].parameters.values()
+    assert abs(strength.value - 0.4) < 4e-3
+
+
+def test_terms_and_elements_keep_the_surfaces_of_a_system():
+    """Without strength, the events of the system itself, to 1e-10 s."""
+    start = jnp.array([0.0107, -0.2])
+    run = simulate(Cart(), start, 0.0, 1.1)
+    terms = system_with_terms(Cart(), ())
+    element = system_with_element(terms, Relaxation(), (0, 1))
+    for system, state in ((terms, start), (element, jnp.append(start, 0.0))):
+        again = simulate(system, state, 0.0, 1.1)
+        assert again.switches.kind.tolist() == run.switches.kind.tolist()
+        assert np.max(np.abs(again.switches.time - run.switches.time)) < 1e-10
