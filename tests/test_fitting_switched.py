@@ -75,6 +75,24 @@ class Chain(SwitchedSystem):
         return jnp.concatenate([jnp.stack([u, v]), force])
 
 
+class Belt(SwitchedSystem):
+    """A sprung block on a belt, with a preloaded stop that tears it off at once."""
+
+    friction: jax.Array = eqx.field(default=1.0, converter=jnp.asarray)
+    belt: jax.Array = eqx.field(default=0.5, converter=jnp.asarray)
+    stop: jax.Array = eqx.field(default=0.3, converter=jnp.asarray)
+    preload: jax.Array = eqx.field(default=2.0, converter=jnp.asarray)
+
+    def switching(self, t, state):
+        return jnp.stack([state[1] - self.belt, state[0] - self.stop])
+
+    def branch(self, t, state, sides):
+        beyond = self.preload + 50 * (state[0] - self.stop)
+        pressed = jnp.where(sides[1] > 0, beyond, 0.0)
+        force = -state[0] - pressed - self.friction * sides[0]
+        return jnp.stack([state[1], force])
+
+
 class Relay(SwitchedSystem):
     """A relay with hysteresis that kicks the state when it switches."""
 
@@ -109,6 +127,7 @@ CASES = {
         3.0,
         ((60, 16), (480, 1)),
     ),
+    "an event that causes another": (Belt(), (0.0, 0.3), 1.0, ((100, 16), (800, 1))),
     "relay": (Relay(), (0.0, 0.7), 9.0, ((100, 16), (800, 1))),
 }
 

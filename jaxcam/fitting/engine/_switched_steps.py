@@ -305,7 +305,8 @@ def _integrated(steps: _Steps, state, parts: Part):
     """
     size = steps.size
 
-    def advance(x, part: Part):
+    def advance(carried, part: Part):
+        x, moved_by = carried
         number = jnp.minimum(part.number, steps.count - 1)
         t = steps.begin(number) + part.offset
         field = steps.field(number, part.mode)
@@ -318,11 +319,17 @@ def _integrated(steps: _Steps, state, parts: Part):
         # where the motion hardly approaches the surface, the time is not differentiated
         slope = jnp.where(slope < 0, slope, -jnp.inf)
         later = -(distance - jax.lax.stop_gradient(distance)) / slope
+        event, at_once = jnp.any(part.ends), part.length == 0
+        # an event that another one causes moves with that one
+        later = jnp.where(at_once & (moved_by[1] > 0), moved_by[0], later)
+        kept = jnp.where(at_once, moved_by, 0.0)
+        moved_by = jnp.where(event, jnp.stack([later, 1.0]), kept)
         landed = state_after(system, t, (there + later * before)[:size], part.ends)
         moved = (there + later * before).at[:size].set(landed)
         moved = moved - later * steps.field(number, part.after)(t, moved)
-        return jnp.where(jnp.any(part.ends), moved, there), (x, rate)
+        return (jnp.where(event, moved, there), moved_by), (x, rate)
 
-    end, (states, rates) = jax.lax.scan(advance, state, parts)
+    carried = state, jnp.zeros(2)
+    (end, _), (states, rates) = jax.lax.scan(advance, carried, parts)
     first = jnp.searchsorted(parts.number, jnp.arange(steps.count))
     return states[first], rates[first], end
