@@ -482,3 +482,23 @@ def test_a_stack_at_rest_stays_at_rest():
     assert abs(run.switches.time[0] - 2.0) < 1e-12
     # between - below = 0.2 - 0.2: the lower block does not move
     np.testing.assert_allclose(run.final, [0.0, 0.05 / 3, 0.0, 0.05], atol=1e-12)
+
+
+@pytest.mark.parametrize("load", [1.0, -1.0, 1.05, -1.05])
+def test_static_friction_holds_two_blocks_from_the_start(load):
+    """Loads of one, the kinetic friction, and more; static friction is 1.5."""
+
+    class Blocks(SwitchedSystem):
+        @property
+        def holding(self) -> Any:
+            return 1.5
+
+        def switching(self, t, state):
+            return state[2:]
+
+        def branch(self, t, state, sides):
+            forces = jnp.stack([load + 0 * t, load + 0 * t]) - sides
+            return jnp.concatenate([state[2:], forces])
+
+    run = run_of(Blocks(), np.zeros(4), 3.0)
+    assert not run.switches.kind.size and not np.any(run.final)

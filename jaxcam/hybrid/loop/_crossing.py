@@ -7,7 +7,6 @@ import jax.numpy as jnp
 from ._flight import moves_in, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
-from ._hold import hold_of
 from ._loop_state import COMPLETED, LoopState
 from ._select import any_of, select
 from ._step import Step
@@ -73,7 +72,7 @@ def stopped_by_impacts(functions: Functions, carried: LoopState) -> list:
         flags[k] = now & near & ~carried.sliding[k]
     pairs = zip(carried.sliding, flags, strict=True)
     trial = (*carried.mode[: len(carried.jets)], *(a | b for a, b in pairs))
-    excess = hold_of(functions, carried.t, carried.x, trial).excess
+    excess, _ = functions.hold(carried.t, carried.x, trial)
     return [flag & (off <= 0) for flag, off in zip(flags, excess, strict=True)]
 
 

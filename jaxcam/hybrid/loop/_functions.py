@@ -160,6 +160,13 @@ class Functions:
         """Return the weights of the branches beyond the surfaces on which it slides."""
         return tuple(self._call("shares", t, _pack(x), *self._side(mode)))
 
+    def hold(self, t, x, mode) -> tuple[tuple, tuple]:
+        """Return how far the weights of the branches beyond the surfaces on which it
+        slides are outside their limits, and these weights.
+        """
+        off, shares = self._call("hold", t, _pack(x), *self._side(mode))
+        return tuple(off), tuple(shares)
+
     def heights(self, t, x, extents, mode):
         """Return the switching functions, and their rounding errors."""
         reach = [jnp.abs(a) + b for a, b in zip(x, extents, strict=True)]

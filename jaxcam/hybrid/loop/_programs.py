@@ -24,6 +24,7 @@ from ..surface import (
     gaps,
     has_friction,
     heights_rounded,
+    hold_of,
     impacts,
     impacts_together,
     joint_rest,
@@ -145,6 +146,7 @@ class Programs:
         if self.slidable:
             self._add("settled", settled, time, state)
             self._add("shares", beyond_shares, time, state)
+            self._add("hold", hold_of, time, state)
             self._add("heights", heights_rounded, time, state, state)
             self._add("slack", slack_of_hold)
 

@@ -7,7 +7,6 @@ from ..surface import gaps, least_gaps
 from ._flight import moves_in
 from ._functions import Functions
 from ._gap_polynomial import Jet
-from ._hold import hold_of
 from ._select import any_of
 
 
@@ -89,13 +88,13 @@ def _held_together(functions: Functions, t, x, contact, sides, touched, slides):
     for k in functions.slidable:
         trial[k] = touched[k]
     for _ in functions.slidable:
-        found = hold_of(functions, t, x, (*contact, *flags, *trial))
-        worst = jnp.max(jnp.stack(found.excess))
-        let_go = (worst > 0) & several
+        excess, shares = functions.hold(t, x, (*contact, *flags, *trial))
+        worst = jnp.max(jnp.stack(excess))
+        waits = (worst > 0) & several
         for k in functions.slidable:
-            goes = let_go & trial[k] & (found.excess[k] == worst)
-            flags[k] = flags[k] ^ (goes & found.beyond[k])
-            trial[k] = trial[k] & ~goes
+            goes = waits & trial[k] & (excess[k] == worst)
+            flags[k] = flags[k] ^ (goes & (shares[k] > 0.5))
+            trial[k], waits = trial[k] & ~goes, waits & ~goes
     return (
         [jnp.where(several, a, b) for a, b in zip(flags, sides, strict=True)],
         [jnp.where(several, a, b) for a, b in zip(trial, slides, strict=True)],

@@ -65,6 +65,7 @@ from ._sliding import (
     field_and_distances_in_mode as field_and_distances_in_mode,
     field_in_mode as field_in_mode,
     heights_rounded as heights_rounded,
+    hold_of as hold_of,
     InMode as InMode,
     Jumps as Jumps,
     open_surfaces as open_surfaces,

@@ -285,6 +285,24 @@ def beyond_shares(mode: InMode, t, x) -> Float[Array, " k"]:
     return jnp.stack([places.get(k, zero) for k in range(len(mode.jumps))])
 
 
+def hold_of(mode: InMode, t, x) -> Float[Array, "2 k"]:
+    """Return how far the weight of the branch beyond each surface is outside its
+    limits, which static friction widens, and this weight.
+
+    It is negative inside, infinite if no side drives the motion back, and -1 where the
+    motion does not slide.
+    """
+    terms = slide_terms(mode, t, x)
+    found, slack = shares(mode, terms), slack_of_hold(mode)
+    off, weights = [-jnp.ones_like(t)] * len(mode.jumps), [0 * t] * len(mode.jumps)
+    for i, k in enumerate(mode.slidable):
+        beyond = jnp.maximum(-found[i], found[i] - 1) - slack[k]
+        beyond = jnp.where(terms.firm[i], beyond, jnp.inf)
+        off[k] = jnp.where(mode.sliding[k], beyond, off[k])
+        weights[k] = found[i]
+    return jnp.stack([jnp.stack(off), jnp.stack(weights)])
+
+
 def settled(mode: InMode, t, x) -> Float[Array, "rows n"]:
     """Return the state moved onto the surfaces on which it slides, by one Newton step,
     then the change of the field beyond each, zero where it does not slide.
