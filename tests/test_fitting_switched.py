@@ -23,7 +23,7 @@ from jaxcam.fitting import (
 from jaxcam.fitting.engine._model import DriveState
 from jaxcam.fitting.engine._predict import fly
 from jaxcam.hybrid import flow, Settings, SwitchedSystem
-from jaxcam.recordings import record
+from jaxcam.recordings import record, Wandering
 
 
 SHARP = Settings(tolerance=1e-12)
@@ -199,3 +199,48 @@ def test_a_free_run_sticks_where_the_motion_does(carts):
     runs, model = carts
     found = free_run(Model(Cart(), SENSORS), runs[0], samples=40)
     assert found.rmse["position_m"] < 3 * 1e-5
+
+
+class Block(SwitchedSystem):
+    """A block that static friction holds for most of the time."""
+
+    state_names = ("position", "velocity")
+    friction: jax.Array = eqx.field(default=1.0, converter=jnp.asarray)
+
+    def switching(self, t, state):
+        return state[1]
+
+    @property
+    def holding(self) -> Any:
+        return 1.4
+
+    def branch(self, t, state, sides):
+        force = 1.6 * jnp.cos(3.0 * t) - 4.0 * state[0] - self.friction * sides[0]
+        return jnp.stack([state[1], force])
+
+
+@pytest.mark.slow
+def test_pieces_that_begin_while_static_friction_holds():
+    """The load is above kinetic friction there; friction within four errors."""
+    sensors, rng = {"position_m": Sensor(0, noise=1e-4)}, np.random.default_rng(0)
+    start = jnp.array([0.1, 0.3])
+    run = record(Block(), sensors, 8.0, rng=rng, state=start, interval=2e-3)
+    model = Model(Block(friction=0.9), sensors)
+    free = [Parameter("friction", lambda m: m.system.friction, tolerance=0.2)]
+    found = fit(Problem.build(model, segment_by_model(model, [run]), free))
+    (friction,) = found.estimates
+    assert found.converged and friction.stderr < 1e-4
+    assert abs(friction.value - 1.0) < 4 * friction.stderr
+
+
+def test_hysteresis_is_refused_in_a_sentence(carts):
+    runs, _ = carts
+    model = Model(Relay(), SENSORS)
+    free = [Parameter("force", lambda m: m.system.force)]
+    with pytest.raises(ValueError, match="hysteresis: between the thresholds"):
+        Problem.build(model, segment_by_model(model, runs[:1]), free)
+
+
+def test_a_drifting_drive_of_a_switched_system_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="does not support switching surfaces"):
+        Wandering(Cart(), phase=lambda system: system.stop)

@@ -23,6 +23,7 @@ from .engine import (
     Model,
     runge_kutta,
     state_size,
+    surfaces_in,
     switched_nodes,
     Turning,
     with_constants,
@@ -212,8 +213,7 @@ def simulated(model: Model, one: Prepared) -> Simulated:
     step = one.interval / one.steps
     size = one.state.shape[0] - len(filtered_channels(model))
 
-    def seen(t, system, x):
-        field = augmented_field(model, system, t, x)
+    def seen(t, system, x, field):
         values = []
         for name, sensor in model.sensors.items():
             if sensor.filtered:
@@ -235,20 +235,22 @@ def simulated(model: Model, one: Prepared) -> Simulated:
             still = jnp.zeros(one.steps)
             drive = DriveState(jnp.full(one.steps, level), still, still)
             found = switched_nodes(model, x, t, step, drive, 1, mode, _EVENTS)
-            return (found[0][-1], found[2]), seen(t, system, x)
+            return (found[0][-1], found[2]), seen(t, system, x, found[1][0])
 
         def advance(x, k):
             at = t + k * step
             return runge_kutta(model, lambda t: system, at, x, step)[0], None
 
         after, _ = jax.lax.scan(advance, x, jnp.arange(one.steps, dtype=float))
-        return (after, None), seen(t, system, x)
+        field = augmented_field(model, system, t, x)
+        return (after, None), seen(t, system, x, field)
 
     numbers, mode = jnp.arange(one.level.shape[0], dtype=float), None
     if isinstance(model.system, SwitchedSystem):
         none = jnp.zeros_like(one.start)
         system = model.driven(one.start, DriveState(one.level[0], none, none))
-        mode = first_mode(system, one.start, one.state[:size])
+        known = surfaces_in(system, one.start, one.state[:size])
+        mode = first_mode(known, system, one.start, one.state[:size], one.interval)
     return jax.lax.scan(sample, (one.state, mode), (numbers, one.level))[1]
 
 

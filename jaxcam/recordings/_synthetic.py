@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..hybrid import HybridSystem, simulate
+from ..hybrid import HybridSystem, simulate, SwitchedSystem
 from ._errors import RecordingError
 from ._recording import Recording
 
@@ -43,6 +43,13 @@ class Wandering(HybridSystem):
         default=lambda system: system.phase, static=True
     )
     """Selects the phase field of `base`."""
+
+    def __check_init__(self):
+        if isinstance(self.base, SwitchedSystem):
+            raise ValueError(
+                "Wandering does not support switching surfaces; record the system with "
+                "a constant drive speed."
+            )
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore

@@ -41,7 +41,7 @@ from ._model import (
     Sensor as Sensor,
     Turning as Turning,
 )
-from ._modes import first_mode as first_mode
+from ._modes import first_mode as first_mode, surfaces_in as surfaces_in
 from ._own_states import own_states as own_states
 from ._parameter import Parameter as Parameter
 from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT

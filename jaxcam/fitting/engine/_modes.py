@@ -11,6 +11,7 @@ from ...hybrid import HybridSystem, SwitchedSystem
 from ...hybrid.loop import jumping_components
 from ...hybrid.surface import (
     beyond_shares,
+    hold_of,
     InMode,
     Jumps,
     OnSides,
@@ -19,6 +20,10 @@ from ...hybrid.surface import (
     surfaces,
     switching_distances,
 )
+
+
+# a slip below this fraction of what friction can change within a piece may be zero
+_STOPPED = 0.01
 
 
 class Mode(NamedTuple):
@@ -51,11 +56,39 @@ def surfaces_in(system: HybridSystem, t, x) -> Surfaces:
     return Surfaces(number, jumping_components(static, shapes, time, state, number))
 
 
-def first_mode(system: HybridSystem, t, x) -> Mode:
-    """Return the mode in which a motion starts; sliding begins in the first step."""
+def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
+    """Return the mode in which a piece of a motion starts.
+
+    A body that kinetic friction can hold begins to slide in the first step. A larger
+    load may be held by static friction, or not: the motion slides from the start if its
+    velocity is small, compared with what the friction can change.
+
+    Args:
+        known: The surfaces.
+        system: The system.
+        t: Time (s).
+        x: State, shape `(n,)`; a velocity that is zero may have an error.
+        duration: Duration of the piece (s).
+
+    Returns:
+        The mode.
+    """
     assert isinstance(system, SwitchedSystem)
     negative = system.sides(t, x) < 0
-    return Mode(negative, jnp.zeros_like(negative))
+    free = Mode(negative, jnp.zeros_like(negative))
+    slidable = [bool(changed) for changed in known.jumps.free]
+    if not any(slidable):
+        return free
+    rates = []
+    for sides in (negative, ~negative):
+        branch = known.within(system, Mode(sides, free.sliding))
+        _, rate = distances_along(branch, t, x, branch.vector_field(t, x))
+        rates.append(rate)
+    height, _ = distances_along(known.within(system, free), t, x, 0 * x)
+    change = jnp.abs(rates[0] + rates[1]) * duration
+    near = jnp.array(slidable) & (jnp.abs(height) <= _STOPPED * change)
+    held, _ = hold_of(known.within(system, Mode(negative, near)), t, x)
+    return Mode(negative, near & (held <= 0) & (slack_of_hold(branch) > 0))
 
 
 def on_side_of(system: HybridSystem, t, x) -> HybridSystem:

@@ -63,7 +63,12 @@ from ._model import Input, Model
 from ._own_states import own_states
 from ._parameter import Parameter
 from ._pieces import gather, Pieces, Span
-from ._problem_checks import parameter_places, refuse_not_finite, refuse_repeated
+from ._problem_checks import (
+    parameter_places,
+    refuse_hysteresis,
+    refuse_not_finite,
+    refuse_repeated,
+)
 from ._sharpness import joint_sharpness
 from ._starts import state_size, suggested_starts
 from ._step_size import (
@@ -157,6 +162,7 @@ class Problem:
         )
         constants = known_constants(model, [part.recording for part in segments])
         parameters = (*parameters, *constants)
+        refuse_hysteresis(model)
         refuse_repeated(parameters)
         layout = Layout(model, parameter_places(model, parameters))
         nominal = np.array([float(p.where(model)) for p in parameters])

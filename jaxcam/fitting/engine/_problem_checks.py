@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ...hybrid import SwitchedSystem
 from ._linearise import Layout, Point
 from ._model import augmented_field, Model
 from ._pieces import Pieces
@@ -37,6 +38,18 @@ def _rates(layout: Layout, point: Point, pieces: Pieces):
         return jax.vmap(at)(states, start, drive)
 
     return jax.vmap(one)(*point, jnp.asarray(pieces.flown.start), pieces.drive_at)
+
+
+def refuse_hysteresis(model: Model) -> None:
+    """Raise `ValueError` for a system whose side at the start of a piece is unknown."""
+    system = model.system
+    if isinstance(system, SwitchedSystem) and np.any(np.asarray(system.hysteresis) > 0):
+        raise ValueError(
+            f"{type(system).__name__} has switching surfaces with hysteresis: between "
+            "the thresholds, a piece of a recording does not tell on which side it "
+            "begins. Fit such a system with `jaxcam.simulate`, or set `hysteresis` to "
+            "zero."
+        )
 
 
 def refuse_repeated(parameters) -> None:

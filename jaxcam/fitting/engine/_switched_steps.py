@@ -147,7 +147,8 @@ def _steps(model: Model, state, start, step, drive: DriveState, mode, events):
     system = model.during(start + step / 2, first)(start)
     known = surfaces_in(system, start, state[:size])
     if mode is None:
-        mode = first_mode(system, start, state[:size])
+        duration = step * jnp.asarray(drive.angle.shape[0], dtype=float)
+        mode = first_mode(known, system, start, state[:size], duration)
     return _Steps(model, start, step, drive, known, size, events), mode
 
 
