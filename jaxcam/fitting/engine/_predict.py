@@ -63,9 +63,9 @@ def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps)
     return _nodes(model, state, start, step, drive, substeps)[0][-1]
 
 
-def _nodes(model: Model, state, start, step, drive: DriveState, substeps: int):
+def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
     """Return the states at the ends of all steps `(n + 1, s)`, and their rates."""
-    part = step / substeps
+    part = step / jnp.asarray(substeps, dtype=float)
 
     def advance(x, inputs):
         number, here = inputs
@@ -76,7 +76,8 @@ def _nodes(model: Model, state, start, step, drive: DriveState, substeps: int):
             return x1, (x, k1)
 
         def inner(k, x):
-            return runge_kutta(model, system_at, t0 + k * part, x, part)[0]
+            t = t0 + jnp.asarray(k, dtype=float) * part
+            return runge_kutta(model, system_at, t, x, part)[0]
 
         k1 = augmented_field(model, system_at(t0), t0, x)
         return jax.lax.fori_loop(0, substeps, inner, x), (x, k1)

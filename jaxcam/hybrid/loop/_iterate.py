@@ -80,9 +80,8 @@ def _iterate(
         carried, made = refreshed(carried, made)
     judged = _judge_flights(functions, plan, carried, end, made, rounding)
     flown, lands = judged.flown, judged.lands
-    landing = land(
-        functions, plan, carried, end, made, lands, flown, rounding, judged.stops
-    )
+    parts = lands, flown, rounding, judged.stops
+    landing = land(functions, plan, carried, end, made, *parts)
     chatter, begins = landing.chatter, landing.begins
 
     # contact: the state is moved onto the surface a second time, then checked
@@ -104,8 +103,7 @@ def _iterate(
     x, jets = off_rounding(
         made.frame, landing.jets, landing.x, landing.hit, carried.extents
     )
-    x = select(sticking & ~lands, left, x)
-    x = select(begins, chatter.state, x)
+    x = select(begins, chatter.state, select(sticking & ~lands, left, x))
     t = landing.t + delay
     went = [released & (held.constraint == k) for k in range(functions.m)]
     # a multiplier that only reaches zero has not released
