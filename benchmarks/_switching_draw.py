@@ -75,6 +75,8 @@ def _machine(rng, family: str, shape: Shape) -> Problem:
     if shape.rubs and rng.random() < 0.25:
         # it sticks at the start, or slips from rest
         state[d:] = np.linalg.pinv(values["slips"]) @ values["belts"]
+        # so that no slip is left by rounding
+        values["belts"] = values["slips"] @ state[d:]
         state[:d] *= 0.3
     ends = shape.wall and bool(np.any(values["slips"][:, 0]))
     if shape.wall:

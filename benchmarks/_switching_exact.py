@@ -107,9 +107,6 @@ class _Loop:
         near = np.flatnonzero(np.abs(heights) < _STOPPED)
         touched = [int(i) for i in near if self.system.width[i] == 0]
         if len(touched) > 1:
-            if np.any(heights[touched] != 0):
-                self.reason = "starts on several surfaces, but for rounding"
-                return
             self._begin(touched)
         elif touched:
             self._arrive(touched[0], started=True)

@@ -35,7 +35,7 @@ _SLOW = 1e-6
 class Verdict(NamedTuple):
     """The result of one problem."""
 
-    # "agrees", "grazes" or "DISAGREES"
+    # "agrees", "grazes", "ambiguous" (several motions from the start) or "DISAGREES"
     label: str
     what: str
     # fraction of the span that was compared, and the number of events
@@ -90,6 +90,8 @@ def know(problem: Problem) -> Known:
 def judge(problem: Problem, known: Known, settings: Settings = SETTINGS) -> Verdict:
     """Compare a run of jaxcam with what is known."""
     exact, end = known.exact, known.end
+    if end <= 0 and exact.reason:
+        return Verdict("ambiguous", exact.reason, 0.0, 0, 0.0, 0.0)
     run = jaxcam.simulate(
         problem.system, problem.state, 0.0, problem.span, settings=settings
     )

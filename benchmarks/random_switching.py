@@ -35,13 +35,16 @@ def verdict_of(seed: int, settings: Settings = SETTINGS) -> Verdict:
 
 def table(found: dict[str, list[Verdict]]) -> str:
     """The results of each family."""
-    columns = "systems agree graze disagree events compared error allowed".split()
+    columns = (
+        "systems agree graze ambiguous disagree events compared error allowed".split()
+    )
     lines = [f"{'family':22s}" + "".join(f"{c:>11s}" for c in columns)]
     whole = [v for each in found.values() for v in each]
     for family, verdicts in [*found.items(), ("all", whole)]:
         labels = collections.Counter(v.label for v in verdicts)
         right = [v for v in verdicts if v.label != "DISAGREES"]
-        numbers = len(verdicts), labels["agrees"], labels["grazes"], labels["DISAGREES"]
+        kinds = "agrees", "grazes", "ambiguous", "DISAGREES"
+        numbers = len(verdicts), *(labels[kind] for kind in kinds)
         lines.append(
             f"{family:22s}"
             + "".join(f"{n:11d}" for n in (*numbers, sum(v.events for v in verdicts)))

@@ -57,13 +57,25 @@ def test_drag_is_found_beside_dry_friction():
     assert abs(strength.value - 0.4) < 4e-3
 
 
-def test_terms_and_elements_keep_the_surfaces_of_a_system():
-    """Without strength, the events of the system itself, to 1e-10 s."""
+class Walled(Cart):
+    """The same with a rigid wall."""
+
+    def gap(self, t, state):
+        return state[0] + 0.02
+
+    def impact(self, t, state):
+        return state.at[1].multiply(-0.7)
+
+
+def test_terms_and_elements_keep_the_events_of_a_system():
+    """Without strength, switches and impacts of the system itself, to 1e-10 s."""
     start = jnp.array([0.0107, -0.2])
-    run = simulate(Cart(), start, 0.0, 1.1)
-    terms = system_with_terms(Cart(), ())
+    run = simulate(Walled(), start, 0.0, 1.1)
+    assert run.switches.time.size > 2 and run.impacts.time.size
+    terms = system_with_terms(Walled(), ())
     element = system_with_element(terms, Relaxation(), (0, 1))
     for system, state in ((terms, start), (element, jnp.append(start, 0.0))):
         again = simulate(system, state, 0.0, 1.1)
         assert again.switches.kind.tolist() == run.switches.kind.tolist()
         assert np.max(np.abs(again.switches.time - run.switches.time)) < 1e-10
+        assert np.max(np.abs(again.impacts.time - run.impacts.time)) < 1e-10

@@ -243,4 +243,4 @@ def test_hysteresis_is_refused_in_a_sentence(carts):
 
 def test_a_drifting_drive_of_a_switched_system_is_refused_in_a_sentence():
     with pytest.raises(ValueError, match="does not support switching surfaces"):
-        Wandering(Cart(), phase=lambda system: system.stop)
+        Wandering(Cart())

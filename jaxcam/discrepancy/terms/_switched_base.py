@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -12,23 +13,10 @@ from ._with_hidden import WithHidden
 from ._with_terms import WithTerms
 
 
-class SwitchedWithTerms(WithTerms, SwitchedSystem):
-    """A switched system and terms added to each of its branches."""
+class _Around(SwitchedSystem):
+    """A switched system with the surfaces of its base."""
 
-    base: SwitchedSystem
-    """The system."""
-
-    def vector_field(self, t, state) -> jax.Array:
-        return self.branch(t, state, self.sides(t, state))
-
-    def switching(self, t, state):
-        return self.base.switching(t, state)
-
-    def branch(self, t, state, sides) -> jax.Array:
-        return self._pushed(t, state, self.base.branch(t, state, sides))
-
-    def sides(self, t, state):
-        return self.base.sides(t, state)
+    base: eqx.AbstractVar[SwitchedSystem]
 
     @property
     def hysteresis(self):
@@ -46,6 +34,25 @@ class SwitchedWithTerms(WithTerms, SwitchedSystem):
     def has_contact_friction(self) -> bool:
         return self.base.has_contact_friction
 
+
+class SwitchedWithTerms(WithTerms, _Around):
+    """A switched system and terms added to each of its branches."""
+
+    base: SwitchedSystem
+    """The system."""
+
+    def vector_field(self, t, state) -> jax.Array:
+        return self.branch(t, state, self.sides(t, state))
+
+    def switching(self, t, state):
+        return self.base.switching(t, state)
+
+    def branch(self, t, state, sides) -> jax.Array:
+        return self._pushed(t, state, self.base.branch(t, state, sides))
+
+    def sides(self, t, state):
+        return self.base.sides(t, state)
+
     def contact_friction(self, t, state, sides):
         return self.base.contact_friction(t, state, sides)
 
@@ -53,7 +60,7 @@ class SwitchedWithTerms(WithTerms, SwitchedSystem):
         return self.base.reset(t, state, sides)
 
 
-class SwitchedWithHidden(WithHidden, SwitchedSystem):
+class SwitchedWithHidden(WithHidden, _Around):
     """A switched system with an element that has an internal state, which does not
     change at the surfaces.
     """
@@ -72,22 +79,6 @@ class SwitchedWithHidden(WithHidden, SwitchedSystem):
 
     def sides(self, t, state):
         return self.base.sides(t, self._own(state))
-
-    @property
-    def hysteresis(self):
-        return self.base.hysteresis
-
-    @property
-    def holding(self):
-        return self.base.holding
-
-    @property
-    def restitution_kind(self):
-        return self.base.restitution_kind
-
-    @property
-    def has_contact_friction(self) -> bool:
-        return self.base.has_contact_friction
 
     def contact_friction(self, t, state, sides):
         rows = self.base.contact_friction(t, self._own(state), sides)

@@ -79,16 +79,16 @@ def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
     slidable = [bool(changed) for changed in known.jumps.free]
     if not any(slidable):
         return free
-    rates = []
-    for sides in (negative, ~negative):
-        branch = known.within(system, Mode(sides, free.sliding))
-        _, rate = distances_along(branch, t, x, branch.vector_field(t, x))
-        rates.append(rate)
-    height, _ = distances_along(known.within(system, free), t, x, 0 * x)
-    change = jnp.abs(rates[0] + rates[1]) * duration
+    own, other = (
+        known.within(system, Mode(sides, free.sliding))
+        for sides in (negative, ~negative)
+    )
+    height, rate = distances_along(own, t, x, own.vector_field(t, x))
+    _, beyond = distances_along(other, t, x, other.vector_field(t, x))
+    change = jnp.abs(rate + beyond) * duration
     near = jnp.array(slidable) & (jnp.abs(height) <= _STOPPED * change)
     held, _ = hold_of(known.within(system, Mode(negative, near)), t, x)
-    return Mode(negative, near & (held <= 0) & (slack_of_hold(branch) > 0))
+    return Mode(negative, near & (held <= 0) & (slack_of_hold(own) > 0))
 
 
 def on_side_of(system: HybridSystem, t, x) -> HybridSystem:
@@ -143,6 +143,6 @@ def mode_after(
     slack = slack_of_hold(system)
     back = rate <= jnp.maximum(-before, 0.0) * slack / (1 + slack)
     # with hysteresis, the other threshold is a finite distance away
-    firm = jnp.broadcast_to(jnp.asarray(system.system.hysteresis), back.shape) == 0
-    arrives = ends & ~slid & back & firm & jnp.array(slidable)
+    apart = jnp.broadcast_to(jnp.asarray(system.system.hysteresis), back.shape) > 0
+    arrives = ends & ~slid & back & ~apart & jnp.array(slidable)
     return Mode(left.negative, left.sliding | arrives)
