@@ -11,6 +11,7 @@ import optimistix as optx
 from jaxtyping import Float
 
 from ._context import Context
+from ._padding import Padded
 from ._parameter import with_leaf
 from .problem import AbstractProblem
 
@@ -47,7 +48,8 @@ def scale_at(problem: AbstractProblem, leaf: int, z, width):
     """
     parameters = with_leaf(problem.parameters, leaf, z[-1])
     u = z[:-1]
-    size = problem.scale(u, parameters) * jnp.sqrt(jnp.asarray(u.size, u.dtype))
+    number = jnp.asarray(problem.number_of_unknowns(u), u.dtype)
+    size = problem.scale(u, parameters) * jnp.sqrt(number)
     return jnp.concatenate([size, jnp.reshape(width, (1,))])
 
 
@@ -162,19 +164,42 @@ def correct(
     """Call the compiled `correct_` with numbers as arguments; the result has NumPy
     arrays.
     """
-    return _plain(
+    padded = problem.padded()
+    vectors = [np.asarray(z) for z in (guess, normal, old)]
+    if padded is not None:
+        vectors = [padded.widened(z) for z in vectors]
+    at = _plain(
         _correct(
-            problem,
+            problem if padded is None else padded.problem,
             context.leaf,
-            np.asarray(guess),
-            np.asarray(normal),
-            np.asarray(old),
+            *vectors,
             np.asarray(context.width),
             np.asarray(context.settings.tolerance),
             context.settings.max_iterations,
             least_norm,
             np.asarray(given),
         )
+    )
+    return at if padded is None else _narrowed(at, padded, problem)
+
+
+def _narrowed(at: Corrected, padded: Padded, problem: AbstractProblem) -> Corrected:
+    """Return the results for the original unknowns of a padded problem."""
+    kept = padded.positions(padded.kept.size + 1)
+    # the equations u = 0 of the additional unknowns contribute their scales
+    added = np.delete(at.scale, kept)
+    root = np.abs(at.determinant)
+    with np.errstate(divide="ignore"):
+        log = at.scale.size * np.log(root) - np.sum(np.log(added))
+    determinant = np.sign(at.determinant) * np.exp(log / kept.size)
+    return dataclasses.replace(
+        at,
+        z=at.z[kept],
+        jacobian=at.jacobian[np.ix_(padded.kept, kept)],
+        tangent=at.tangent[kept],
+        determinant=determinant,
+        scale=at.scale[kept],
+        monitors={name: at.monitors[name] for name in problem.monitors()},
     )
 
 
@@ -205,7 +230,14 @@ def solve(problem, u, settings, iterations: int = 30):
     """Solve a problem at its own parameters from a guess; return value, success and
     residual.
     """
+    padded, u = problem.padded(), np.asarray(u)
+    if padded is not None:
+        problem, u = padded.problem, padded.widened(u)
     value, success, _, g = _solve(
-        problem, np.asarray(u), np.asarray(settings.tolerance), iterations
+        problem, u, np.asarray(settings.tolerance), iterations
     )
-    return np.asarray(value), bool(success), np.asarray(g)
+    value, g = np.asarray(value), np.asarray(g)
+    if padded is not None:
+        kept = padded.positions(padded.kept.size)
+        value, g = value[kept], g[kept]
+    return value, bool(success), g

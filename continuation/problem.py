@@ -18,6 +18,7 @@ from ._local_dynamics import (
     StabilityKind as StabilityKind,
 )
 from ._monitor import Monitor as Monitor
+from ._padding import Padded
 from .representation import AbstractRepresentation, Unique
 
 
@@ -197,6 +198,10 @@ class AbstractProblem(eqx.Module):
         size = jnp.maximum(1.0, jnp.sqrt(jnp.mean(u * u)))
         return jnp.broadcast_to(size, u.shape)
 
+    def number_of_unknowns(self, u: Float[Array, " n"]) -> Any:
+        """Return the number n of unknowns, without padding."""
+        return u.size
+
     # -- monitors
 
     def monitors(self) -> Mapping[str, Monitor]:
@@ -236,6 +241,12 @@ class AbstractProblem(eqx.Module):
         return jnp.stack([values[name] for name in self.monitors()])[number]
 
     # -- between compiled programs
+
+    def padded(self) -> Padded | None:
+        """Return the problem with additional unknowns that compiled programs use, so
+        that problems of different sizes share one; None for the problem itself.
+        """
+        return None
 
     def kind_of_zero(
         self, name: str, before: tuple[Any, PyTree], after: tuple[Any, PyTree]
@@ -342,8 +353,3 @@ class AbstractProblem(eqx.Module):
                 f"{self.signature!r}; use the problem with which it was computed"
             )
         return self
-
-
-def jacobian_of(problem: AbstractProblem, u: Float[Array, " n"], parameters: PyTree):
-    """Return dG/du, shape (n, n)."""
-    return jax.jacfwd(problem.residual)(u, parameters)

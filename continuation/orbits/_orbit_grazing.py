@@ -10,6 +10,7 @@ import numpy as np
 from variational.orbits import lowest_times
 
 from .._context import Context
+from .._padding import as_compiled
 from .._parameter import as_arguments
 from .._point import set_parameters
 from .._program import evaluate
@@ -26,10 +27,11 @@ _NUDGE = 1e-6
 @eqx.filter_jit
 def _lowest(problem, u, parameters):
     starts, ends = problem.equations.flights(u, parameters)
-    whole = not problem.constraints
-    return jax.vmap(
-        lambda a, b: lowest_times(parameters, a, b, problem.steps, whole_turn=whole)
+    steps, whole = problem.equations.steps, not problem.equations.rows
+    times, heights = jax.vmap(
+        lambda a, b: lowest_times(parameters, a, b, steps, whole_turn=whole)
     )(starts, ends)
+    return starts, times, heights
 
 
 def orbit_grazing(problem: Any, point: Any) -> Start | None:
@@ -59,11 +61,12 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
         equations, state = without_impact(problem.equations, u, parameters, number)
         watched = Watched("gap", (number - 1) % max(m - 1, 1))
     else:
-        times, heights = _lowest(problem, u, parameters)
+        starts, times, heights = _lowest(*as_compiled(problem, u), parameters)
         which = int(np.argmin(np.asarray(heights)[number]))
         time = float(times[number, which])
+        start = np.asarray(starts)[number]
         equations, state = with_impact(
-            problem.equations, u, parameters, number, time, which
+            problem.equations, u, parameters, number, start, time, which
         )
         watched = Watched("speed", number + 1 if m else 0)
     changed = problem.of(parameters, equations)

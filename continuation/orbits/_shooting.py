@@ -1,27 +1,32 @@
 """Periodic orbits with impacts as a continuation problem."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from ..problem import AbstractProblem, LocalDynamics, Monitor, StabilityKind, Start
+from .._padding import Padded
+from ..problem import AbstractProblem, Monitor, Start
 from ..special import FLIP
 from ._impact_sequences import ImpactSequences
+from ._orbit_equations import AbstractOrbits, PaddedOrbits
 from ._orbit_grazing import orbit_grazing
 from ._run_twice import run_twice
 from ._shooting_graze import multipliers_of
-from ._watched import Watched, watched_of
+from ._watched import monitors_of, watched_of
 
 
-class ImpactingOrbits(AbstractProblem):
+_ROWS = 16
+"""Programs are compiled for multiples of this number of impacts."""
+
+
+class ImpactingOrbits(AbstractOrbits):
     """Periodic orbits of a hybrid system with a known sequence of impacts.
 
     The unknowns and equations are those of [`variational.orbits.Shooting`][]. For each
@@ -39,11 +44,6 @@ class ImpactingOrbits(AbstractProblem):
         >>> start.problem.constraints, start.state.shape
         ((0,), (3,))
     """
-
-    stability: ClassVar[StabilityKind] = "map"
-    """Multipliers on the unit circle mark bifurcations."""
-    costly: ClassVar[bool] = True
-    """Second derivatives take a long time to compile."""
 
     parameters: HybridSystem
     """The [`jaxcam.hybrid.HybridSystem`][]."""
@@ -82,113 +82,18 @@ class ImpactingOrbits(AbstractProblem):
         """The equations of multiple shooting."""
         return Shooting(self.constraints, self.periods, self.dimension, self.steps)
 
-    def residual(self, u, parameters) -> Float[Array, " n"]:
-        return self.equations.residual(u, parameters)
-
-    def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
-        """Return the monodromy matrix for the state just after the first impact.
-
-        Without forcing, it is that of the return map to the constraint.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-
-        Returns:
-            The matrix, shape `(k, k)`.
-        """
-        if not self.constraints:
-            return jacobian + jnp.eye(self.dimension)
-        matrix = orbits.monodromy_of(self.equations, u, parameters)
-        return self._returned(u, parameters, matrix)
-
-    def _returned(self, u, parameters, matrix):
-        if self.periods:
-            return matrix
-        return orbits.return_map(self.equations, u, parameters, matrix)
-
-    def local_dynamics(self, u, parameters) -> LocalDynamics:
-        """Return the map from the first impact to the one a period later.
-
-        It acts on the phase of the impact and the state after it, or only on the state
-        if there is no forcing.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-
-        Returns:
-            A `LocalDynamics`.
-        """
-        jacobian, at = orbits.around_the_period(self.equations, u, parameters)
-        return LocalDynamics(at, None, jacobian)
-
-    def derivatives(self, u, p, parameters_at):
-        """Return both derivatives from one Jacobian of each flight.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-
-        Returns:
-            As for `AbstractProblem.derivatives`.
-        """
-        if not self.constraints:
-            return AbstractProblem.derivatives(self, u, p, parameters_at)
-        whole, matrix = orbits.equations_and_monodromy(
-            self.equations, u, p, parameters_at
-        )
-        return whole, self._returned(u, parameters_at(p), matrix)
+    def padded(self) -> Padded | None:
+        m, row = len(self.constraints), 1 + self.dimension
+        rows = -(-m // _ROWS) * _ROWS
+        if rows == m:
+            return None
+        wide = PaddedOrbits(self.parameters, self.equations.padded(rows))
+        return Padded(wide, np.arange(m * row), rows * row)
 
     # -- monitors
 
     def monitors(self) -> Mapping[str, Monitor]:
-        m = len(self.constraints)
-
-        def monitor(one: Watched) -> Monitor:
-            if one.what == "gap":
-                return Monitor("grazing", ends=True)
-            # so are the gaps of the flights next to an impact of zero speed
-            beside = ((one.number - 1) % m, one.number)
-            names = tuple(Watched("gap", k).name for k in beside)
-            return Monitor("grazing", ends=True, vanishing=names)
-
-        return {name: monitor(one) for name, one in watched_of(m).items()}
-
-    def watched(self, number, u, parameters) -> Float[Array, ""]:
-        flights = max(len(self.constraints), 1)
-        if isinstance(number, int) and number >= flights:
-            return self.equations.approach(u, parameters)[number - flights]
-        return self.equations.gap_or_speed(jnp.asarray(number), u, parameters)
-
-    def seen(self, u, parameters):
-        """Return the monitors and the observed quantities.
-
-        The observed quantities are the period (s), the time (s) and state after the
-        first impact, the integration error, the scale of the gaps in their units and,
-        with forcing, the states at whole forcing periods, `(periods, n)`.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-
-        Returns:
-            As for `AbstractProblem.seen`.
-        """
-        equations = self.equations
-        seen = equations.seen(u, parameters)
-        start = equations.flights(u, parameters)[0][0]
-        found = {
-            "period": equations.period(u, parameters),
-            "time": start[0],
-            "state": start[1:],
-            "integration error": seen.error,
-            "gap size": seen.gap_size,
-        }
-        if self.periods:
-            found["stroboscopic"] = equations.stroboscopic(u, parameters, seen)
-        rows = {"gap": seen.gaps, "speed": seen.speeds}
-        monitors = {
-            name: rows[what][k]
-            for name, (what, k) in watched_of(len(self.constraints)).items()
-        }
-        return monitors, found
+        return monitors_of(len(self.constraints))
 
     # -- between compiled programs
 

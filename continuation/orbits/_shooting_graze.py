@@ -63,4 +63,4 @@ def multipliers_of(
 
 @eqx.filter_jit
 def _parts(equations, u, parameters, number):
-    return product_of_links(links_of(equations, u, parameters), number)
+    return product_of_links(equations, links_of(equations, u, parameters), number)

@@ -28,16 +28,14 @@ def without_impact(equations: Shooting, u, parameters, number: int):
 
 
 def with_impact(
-    equations: Shooting, u, parameters, flight: int, time: float, which: int
+    equations: Shooting, u, parameters, flight: int, start, time: float, which: int
 ):
     """Return the equations with an additional impact on `which` at `time` (s) in a
-    flight.
+    flight from the row `start` (time, state).
     """
-    u = jnp.asarray(u)
-    starts, _ = equations.flights(u, parameters)
-    start = starts[flight]
-    state = flown(parameters, start[0], start[1:], jnp.asarray(time))
-    length = float(equations.period(u, parameters))
+    first = jnp.asarray(start[0]), jnp.asarray(start[1:])
+    state = flown(parameters, *first, jnp.asarray(time))
+    length = float(equations.period(jnp.asarray(u), parameters))
     row = np.concatenate([[time / length * max(equations.periods, 1)], state])
     hits = equations.constraints
     if not hits:

@@ -1,6 +1,9 @@
 """Monitors of orbits with impacts: gaps in flights and speeds of impacts."""
 
+import functools
 from typing import Literal, NamedTuple
+
+from .._monitor import Monitor
 
 
 class Watched(NamedTuple):
@@ -25,3 +28,18 @@ def watched_of(impacts: int) -> dict[str, Watched]:
     gaps = [Watched("gap", k) for k in range(max(impacts, 1))]
     speeds = [Watched("speed", k) for k in range(impacts)]
     return {one.name: one for one in (*gaps, *speeds)}
+
+
+@functools.cache
+def monitors_of(impacts: int) -> dict[str, Monitor]:
+    """Return the monitors of an orbit with this number of impacts, by name."""
+
+    def monitor(one: Watched) -> Monitor:
+        if one.what == "gap":
+            return Monitor("grazing", ends=True)
+        # so are the gaps of the flights next to an impact of zero speed
+        beside = ((one.number - 1) % impacts, one.number)
+        names = tuple(Watched("gap", k).name for k in beside)
+        return Monitor("grazing", ends=True, vanishing=names)
+
+    return {name: monitor(one) for name, one in watched_of(impacts).items()}

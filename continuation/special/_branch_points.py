@@ -13,7 +13,8 @@ from jaxcam.parameters import AnyArray
 from .._context import Context
 from .._parameter import with_leaf
 from .._program import evaluate, residual_at, solve
-from ..problem import AbstractProblem, jacobian_of, StabilityKind
+from ..problem import AbstractProblem, StabilityKind
+from ._jacobian import jacobian_of
 
 
 # displacement for the second derivatives in the correction, for unknowns of size one:

@@ -8,7 +8,8 @@ from jaxtyping import Array, Float, PyTree
 
 from .._parameter import with_leaf
 from .._point import Point, replace
-from ..problem import AbstractProblem, jacobian_of, StabilityKind
+from ..problem import AbstractProblem, StabilityKind
+from ._jacobian import jacobian_of
 
 
 class AbstractExtended(AbstractProblem):

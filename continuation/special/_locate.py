@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import root_scalar
 
 from .._context import Context
 from .._program import correct, Corrected, solve
@@ -79,11 +80,16 @@ def locate(
     estimate. If it fails or leaves the bracket, the bracket is first reduced with
     points of the branch.
     """
+    monitor = problem.monitors().get(name)
+    if monitor is not None and problem.costly and not monitor.bracket:
+        # compiling the extended system would take longer than some more points
+        z = _on_the_way(problem, name, context, a, b)
+        if z is not None:
+            return Located(z, True, "")
     low, high = (a.z, values[0]), (b.z, values[1])
     guess = cubic_between(a, b, values[0] / (values[0] - values[1]))
     choice = context.settings.localise
     newton = choice == "newton" or (choice == "auto" and not problem.costly)
-    monitor = problem.monitors().get(name)
     if monitor is not None:
         newton = newton and not monitor.bracket
     direct = newton or (monitor is not None and not monitor.bracket)
@@ -120,6 +126,31 @@ def locate(
     return Located(
         guess, False, "Newton's method on the extended system did not converge"
     )
+
+
+def _on_the_way(
+    problem: AbstractProblem, name: str, context: Context, a: Corrected, b: Corrected
+) -> np.ndarray | None:
+    """Return the zero of a monitor on the branch from a to b by Brent's method, or None
+    if a point between them could not be computed.
+    """
+    chord = (b.z - a.z) / a.scale
+    points: list[np.ndarray] = []
+
+    def value(share: float) -> float:
+        guess = cubic_between(a, b, share)
+        at = correct(problem, context, guess, chord / a.scale, a.tangent)
+        if not at.success or not _inside(at.z, a.z, b.z, a.scale):
+            raise ArithmeticError
+        points.append(at.z)
+        return float(test_values(problem, context.leaf, at)[name])
+
+    try:
+        found = root_scalar(value, bracket=(0.0, 1.0), method="brentq", xtol=1e-15)
+        value(found.root)
+    except (ArithmeticError, ValueError, RuntimeError):
+        return None
+    return points[-1]
 
 
 def _between_branches(

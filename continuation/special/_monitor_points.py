@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxcam.parameters import AnyArray
 
 from .._context import Context
+from .._padding import Padded
 from .._parameter import with_leaf
 from ..problem import AbstractProblem, Monitor, StabilityKind
 from ._extended import AbstractExtended
@@ -67,6 +68,14 @@ class MonitorLevel(AbstractProblem):
     @property
     def parameters(self) -> PyTree:
         return self.base.parameters
+
+    def padded(self) -> Padded | None:
+        base = self.base.padded()
+        if base is None:
+            return None
+        wide = _level(base.problem, self.leaf, self.width, self.number, self.level)
+        kept = np.append(base.kept, base.size)
+        return Padded(wide, kept, base.size + 1)
 
     def residual(self, u: Float[Array, " n"], parameters: PyTree):
         inner, inside = u[:-1], with_leaf(parameters, self.leaf, u[-1])

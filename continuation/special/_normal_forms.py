@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._context import Context
+from .._padding import as_compiled
 from .._parameter import with_leaf
 from .._program import Corrected, evaluate
 from ..problem import AbstractProblem
@@ -39,7 +40,7 @@ def _c(problem, parameters, u, a, b, c):
 def _jacobians(problem, parameters, u, moves):
     """Return the Jacobian of the local map at displacements from a solution."""
     local = problem.local_dynamics(u, parameters)
-    return jax.lax.map(lambda move: local.jacobian(local.at + move), moves)
+    return jax.vmap(lambda move: local.jacobian(local.at + move))(moves)
 
 
 def _parts(x: Any):
@@ -126,7 +127,8 @@ class _Derivatives:
         return first / reach, again / reach**2
 
     def _jacobians(self, moves: np.ndarray) -> np.ndarray:
-        return np.asarray(_jacobians(self.problem, self.parameters, self.u, moves))
+        problem, u = as_compiled(self.problem, self.u)
+        return np.asarray(_jacobians(problem, self.parameters, u, moves))
 
     def _residual_jacobians(self, moves: np.ndarray) -> np.ndarray:
         """Return Jacobians from the program of the corrector, which is already

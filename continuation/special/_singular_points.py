@@ -11,7 +11,7 @@ from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
 from .._point import set_parameters, with_field
-from ..problem import AbstractProblem, jacobian_of, Monitor, StabilityKind
+from ..problem import AbstractProblem, Monitor, StabilityKind
 from ._bialternate import (
     additive,
     determinant_on_plane,
@@ -19,6 +19,7 @@ from ._bialternate import (
     trace_on_plane,
 )
 from ._extended import AbstractExtended
+from ._jacobian import jacobian_of
 from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 

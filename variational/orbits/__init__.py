@@ -41,7 +41,8 @@ from ._orbit import (
     orbit_of as orbit_of,
 )
 from ._seeds import seed as seed, steps_for as steps_for
-from ._shooting import Seen as Seen, Shooting as Shooting
+from ._shooting import PaddedShooting as PaddedShooting, Shooting as Shooting
+from ._shooting_equations import AbstractShooting as AbstractShooting, Seen as Seen
 from ._special_points import (
     detachment as detachment,
     flip_of_orbit as flip_of_orbit,

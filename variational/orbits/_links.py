@@ -17,7 +17,7 @@ from jaxcam.hybrid import HybridSystem
 from jaxcam.hybrid.surface import gaps, impacts
 
 from ._flight import flight_nodes
-from ._shooting import Shooting
+from ._shooting_equations import AbstractShooting
 
 
 # Newton iterations for an impact time that is known to a part in a hundred
@@ -122,7 +122,7 @@ def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
     return whole.transpose(0, 2, 1, 3).reshape(m * size, m * size)
 
 
-def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
+def links_of(shooting: AbstractShooting, u, system: HybridSystem) -> Link:
     """Return the links of an orbit, `(m, ...)`."""
     starts, ends = shooting.flights(u, system)
     return jax.vmap(lambda a, b, which: link(system, a, b, which, shooting.steps))(
@@ -131,50 +131,61 @@ def links_of(shooting: Shooting, u, system: HybridSystem) -> Link:
 
 
 def product_of_links(
-    links: Link, number: Int[Array, ""] | None = None
+    shooting: AbstractShooting, links: Link, number: Int[Array, ""] | None = None
 ) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
     """Return the monodromy matrix for the state just after the first impact.
 
     With `number`, it is returned as two matrices, regular + singular / approach speed
     of that impact, which are both bounded if the impact is grazing.
     """
-    regular, singular, speed = jax.vmap(lambda one: one.parts)(links)
-    whole = jax.vmap(lambda a, b, v: a + b / v)(regular, singular, speed)
-    m = whole.shape[0]
-    first, second = jnp.eye(whole.shape[1]), jnp.zeros(whole.shape[1:])
-    for k in range(m):
-        # the flight of row k ends in impact k + 1
-        mine = False if number is None else (k + 1) % m == number
-        second = jnp.where(mine, singular[k] @ first, whole[k] @ second)
-        first = jnp.where(mine, regular[k] @ first, whole[k] @ first)
-    return first, second
+    n = links.field.shape[1]
+
+    def extend(product, known):
+        first, second = product
+        one, following, real = known
+        regular, singular, speed = one.parts
+        whole = regular + singular / jnp.where(real, speed, 1.0)
+        # the flight of a row ends in the following impact
+        mine = False if number is None else following == number
+        longer = (
+            jnp.where(mine, regular @ first, whole @ first),
+            jnp.where(mine, singular @ first, whole @ second),
+        )
+        return jax.tree.map(lambda a, b: jnp.where(real, a, b), longer, product), None
+
+    begin = (jnp.eye(n), jnp.zeros((n, n)))
+    known = links, shooting.following, shooting.real
+    return jax.lax.scan(extend, begin, known)[0]
 
 
-def monodromy_of(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "n n"]:
+def monodromy_of(
+    shooting: AbstractShooting, u, system: HybridSystem
+) -> Float[Array, "n n"]:
     """Return the derivative of the state one period after the first impact with respect
     to the state at that impact.
     """
-    return product_of_links(links_of(shooting, u, system))[0]
+    return product_of_links(shooting, links_of(shooting, u, system))[0]
 
 
-def antiperiodic(shooting: Shooting, u, system: HybridSystem) -> Float[Array, "u u"]:
+def antiperiodic(
+    shooting: AbstractShooting, u, system: HybridSystem
+) -> Float[Array, "u u"]:
     """Return the derivative of the equations for a deviation that changes sign each
     period.
 
     It is singular at a flip, where its null vector is the deviation of the doubled
     orbit. The first column belongs to the first phase, even without forcing.
     """
-    if not shooting.constraints:
+    if not shooting.rows:
         return jax.jacfwd(shooting.residual)(u, system) + 2 * jnp.eye(u.size)
-    m = len(shooting.constraints)
-    sign = jnp.ones(m).at[-1].set(-1.0)
-    following = (jnp.arange(m) + 1) % m
-    whole = matrix_of(links_of(shooting, u, system), following, sign)
+    sign = jnp.where(shooting.last, -1.0, 1.0)
+    links = links_of(shooting, u, system)
+    whole = matrix_of(links, shooting.following, sign, shooting.real)
     return whole * _column_scale(shooting, u, system)
 
 
 def equations_and_monodromy(
-    shooting: Shooting, u, p, system_at: Callable
+    shooting: AbstractShooting, u, p, system_at: Callable
 ) -> tuple[Float[Array, "u u+1"], Float[Array, "n n"]]:
     """Return the derivative of the equations with respect to unknowns and parameter,
     and the monodromy matrix.
@@ -183,7 +194,6 @@ def equations_and_monodromy(
     """
     system = system_at(p)
     starts, ends = shooting.flights(u, system)
-    m = len(shooting.constraints)
 
     def one(start, time, which):
         def flown(joined):
@@ -204,9 +214,10 @@ def equations_and_monodromy(
         return found, by_p
 
     links, by_p = jax.vmap(one)(starts, ends, shooting.hit())
-    whole = matrix_of(links, (jnp.arange(m) + 1) % m)
+    whole = matrix_of(links, shooting.following, real=shooting.real)
     whole = whole * _column_scale(shooting, u, system)
-    flip = jnp.tile(-jnp.ones(1 + shooting.dimension).at[0].set(-1.0), m)
+    row = -jnp.ones(1 + shooting.dimension).at[0].set(-1.0)
+    flip = jnp.where(shooting.real[:, None], row, 0.0).reshape(-1)
     # all times are phases times one unit (s)
     unit = shooting.period(u, system) / max(shooting.periods, 1)
     by_unit = jax.vmap(
@@ -223,19 +234,20 @@ def equations_and_monodromy(
         # the period takes the place of the first phase
         whole = whole.at[:, 0].set(flip * by_unit.reshape(-1))
     by_p = flip * by_p.reshape(-1)
-    return jnp.append(whole, by_p[:, None], axis=1), product_of_links(links)[0]
+    matrix = product_of_links(shooting, links)[0]
+    return jnp.append(whole, by_p[:, None], axis=1), matrix
 
 
-def _column_scale(shooting: Shooting, u, system) -> Float[Array, "1 u"]:
+def _column_scale(shooting: AbstractShooting, u, system) -> Float[Array, "1 u"]:
     """Return the factors from derivatives with respect to times (s) to those with
     respect to phases.
     """
     unit = shooting.period(u, system) / max(shooting.periods, 1)
     row = jnp.ones(1 + shooting.dimension).at[0].set(unit)
-    return jnp.tile(row, len(shooting.constraints))[None, :]
+    return jnp.where(shooting.real[:, None], row, 1.0).reshape(1, -1)
 
 
-def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
+def return_map(shooting: AbstractShooting, u, system: HybridSystem, matrix):
     """Return the derivative of the return map to the first constraint, from the
     monodromy matrix.
 
@@ -243,7 +255,7 @@ def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
     """
     starts, _ = shooting.segments(u, system)
     t, x = starts[0, 0], starts[0, 1:]
-    which = shooting.constraints[0]
+    which = jnp.asarray(shooting.hits)[0]
     normal = jax.grad(lambda y: gaps(system, t, y)[which])(x)
     along = system.vector_field(t, x)
     along = along / jnp.dot(normal, along)
@@ -252,7 +264,7 @@ def return_map(shooting: Shooting, u, system: HybridSystem, matrix):
     return basis.T @ (moved - along[:, None] * (normal @ moved)[None, :])
 
 
-def around_the_period(shooting: Shooting, u, system: HybridSystem):
+def around_the_period(shooting: AbstractShooting, u, system: HybridSystem):
     """Return the Jacobian of the map from the first impact to that a period later.
 
     Its variables are (phase, state); without forcing, only the state; without impacts,
@@ -261,13 +273,15 @@ def around_the_period(shooting: Shooting, u, system: HybridSystem):
     Returns:
         The Jacobian as a function of a point, and the point on the orbit.
     """
-    if not shooting.constraints:
+    if not shooting.rows:
         return jax.jacfwd(lambda x: shooting.residual(x, system) + x), u
     starts, ends = shooting.segments(u, system)
 
-    def hop(carry, known):
+    hits = shooting.hit()
+
+    def hop(k, carry):
         start, matrix = carry
-        time, which = known
+        which = hits[k]
 
         def improve(_, found):
             time = found[0]
@@ -276,13 +290,13 @@ def around_the_period(shooting: Shooting, u, system: HybridSystem):
             after = there.value[1:] + change * there.by_end[1:]
             return time + change, after, there.by_impact
 
-        first = (time, start[1:], jnp.zeros_like(matrix))
+        first = (ends[k, 0], start[1:], jnp.zeros_like(matrix))
         time, after, moved = jax.lax.fori_loop(0, _EVALUATIONS, improve, first)
-        return (jnp.append(time, after), moved @ matrix), None
+        return jnp.append(time, after), moved @ matrix
 
     def whole_turn(start):
         begin = (start, jnp.eye(start.size))
-        return jax.lax.scan(hop, begin, (ends[:, 0], shooting.hit()))[0][1]
+        return jax.lax.fori_loop(0, shooting.number, hop, begin)[1]
 
     if shooting.periods == 0:
         return lambda x: whole_turn(jnp.append(starts[0, :1], x))[1:, 1:], starts[0, 1:]

@@ -87,19 +87,19 @@ def gap_or_speed(
     number: Int[Array, ""],
     hit: Int[Array, " m"] | None,
     steps: int,
+    count,
 ) -> Float[Array, ""]:
-    """Return the lowest gap of flight `number`, or for `number` >= m the approach speed
-    of an impact.
+    """Return the lowest gap of flight `number`, or for `number` >= `count` the approach
+    speed of an impact; `count` is the number of flights without padding.
 
     One integration is used for both, so one small program is sufficient. The result is
     differentiable: the time of a minimum has no first-order effect, so the derivative
     is that of the gap at a fixed time. `hit` are the constraints at which the flights
     end, or None for a closed orbit without impacts.
     """
-    m = ends.shape[0]
-    landed = number >= m
+    landed = number >= count
     # flight k ends in impact k + 1
-    k = jnp.where(landed, number - 1, number) % m
+    k = jnp.where(landed, number - 1, number) % count
     start, end = starts[k], ends[k]
     still = jax.lax.stop_gradient((system, start, end))
     times, heights = lowest_times(*still, steps, whole_turn=hit is None)

@@ -1,52 +1,14 @@
-"""Multiple shooting with one segment per flight and the impact times as unknowns.
-
-An orbit with m impacts is given by the times t_k and the states x_k just after each
-impact. With phi the free flight and H and R the gap and impact law of the constraint
-that is hit,
-
-    H(t_{k+1}, phi(t_{k+1}; t_k, x_k)) = 0,
-    x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
-
-closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. These equations contain no division by an
-impact speed, so they are as regular at grazing as elsewhere. Their solutions continue
-beyond it as motions through the constraint, which `seen` detects.
-"""
-
-from typing import NamedTuple
+"""Shooting equations of orbits with a known sequence of impacts, exact or padded."""
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+import numpy as np
 
-from jaxcam.hybrid import HybridSystem
-from jaxcam.hybrid.surface import gaps, impacts, normal_velocity
+from jaxcam.parameters import AnyArray
 
-from ._flight import flight_end, flight_nodes
-from ._gap_sizes import gap_sizes
-from ._lowest_gap import gap_or_speed, lowest_times, nodes_of
+from ._shooting_equations import AbstractShooting
 
 
-class Seen(NamedTuple):
-    """Admissibility of a solution of the shooting equations, and its flights."""
-
-    gaps: Float[Array, " flights"]
-    """Lowest gap within each flight, or in the entire orbit if there are no impacts,
-    shape `(m,)`.
-    """
-    speeds: Float[Array, " m"]
-    """Approach speed of each impact, positive if it is physical, shape `(m,)`."""
-    error: Float[Array, ""]
-    """Estimated error of the flights, relative to 1 + |x|."""
-    gap_size: Float[Array, ""]
-    """Scale of the gaps, in their units."""
-    times: Float[Array, "flights nodes"]
-    """Times at the ends of all steps (s), shape `(flights, 1 + steps)`."""
-    states: Float[Array, "flights nodes n"]
-    """States at these times, shape `(flights, 1 + steps, n)`."""
-
-
-class Shooting(eqx.Module):
+class Shooting(AbstractShooting):
     """The equations of a periodic orbit with a known sequence of impacts.
 
     The unknowns u are, for each impact, its phase (time in forcing periods) and the
@@ -65,200 +27,66 @@ class Shooting(eqx.Module):
     steps: int = eqx.field(static=True, default=32)
     """Number of eighth-order Runge-Kutta steps in each flight."""
 
-    def residual(self, u, system: HybridSystem) -> Float[Array, " u"]:
-        """Return the residual: the gap at each impact, and the mismatch of the impact
-        law.
+    @property
+    def rows(self) -> int:
+        """Number of impacts."""
+        return len(self.constraints)
+
+    @property
+    def number(self) -> int:
+        """Number of impacts."""
+        return len(self.constraints)
+
+    @property
+    def hits(self) -> AnyArray:
+        """Constraint hit by each impact, shape `(m,)`."""
+        return np.array(self.constraints, int)
+
+    def padded(self, rows: int) -> "PaddedShooting":
+        """Return the same equations with this number of rows.
 
         Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
+            rows: Number of rows, at least the number of impacts, which must not be
+                zero.
 
         Returns:
-            The residual, shape `(u,)`; zero for an orbit.
+            A [`variational.orbits.PaddedShooting`][].
         """
-        if not self.constraints:
-            end = self.period(u, system)
-            start = jnp.zeros_like(end)
-            return flight_end(system, start, u, end, steps=self.steps) - u
-        starts, ends = self.segments(u, system)
-        before = self.arrivals(system, starts, ends)
+        hits = np.zeros(rows, int)
+        hits[: self.number] = self.constraints
+        number = np.asarray(self.number)
+        return PaddedShooting(hits, self.periods, self.dimension, self.steps, number)
 
-        def one(end, x, which):
-            gap = gaps(system, end[0], x)[which]
-            after = impacts(system, end[0], x)[which]
-            return jnp.concatenate([gap[None], end[1:] - after])
 
-        return jax.vmap(one)(ends, before, self.hit()).reshape(-1)
+class PaddedShooting(AbstractShooting):
+    """The equations of [`variational.orbits.Shooting`][] with rows of padding.
 
-    def period(self, u, system: HybridSystem) -> Float[Array, ""]:
-        """Return the period of the orbit (s).
+    The number of impacts and their constraints are arrays, so that orbits with
+    different impacts share one compiled program.
+    """
 
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
+    constraints: AnyArray
+    """Constraint hit by each impact, then zeros, shape `(rows,)`."""
+    periods: int = eqx.field(static=True)
+    """Number of forcing periods after which the orbit repeats; 0 without forcing."""
+    dimension: int = eqx.field(static=True)
+    """Number of states n."""
+    steps: int = eqx.field(static=True)
+    """Number of eighth-order Runge-Kutta steps in each flight."""
+    impacts: AnyArray
+    """Number of impacts."""
 
-        Returns:
-            A scalar.
-        """
-        if self.periods == 0:
-            return u[0]
-        return jnp.asarray(self.periods * system.period, dtype=jnp.float64)
+    @property
+    def rows(self) -> int:
+        """Number of rows of unknowns."""
+        return self.constraints.shape[0]
 
-    def segments(self, u, system: HybridSystem):
-        """Return the starts and ends of the flights: times (s) and states.
+    @property
+    def number(self) -> AnyArray:
+        """Number of impacts."""
+        return self.impacts
 
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
-
-        Returns:
-            Two arrays, `(m, 1 + n)` each.
-        """
-        starts = u.reshape(len(self.constraints), 1 + self.dimension)
-        if self.periods == 0:
-            starts = starts.at[0, 0].set(0.0)
-        ends = jnp.roll(starts, -1, axis=0).at[-1, 0].add(max(self.periods, 1))
-        unit = self.period(u, system) / max(self.periods, 1)
-        scale = jnp.ones(1 + self.dimension).at[0].set(unit)
-        return starts * scale[None, :], ends * scale[None, :]
-
-    def flights(self, u, system: HybridSystem):
-        """Return the starts and end times of all flights.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
-
-        Returns:
-            Starts `(m, 1 + n)` and end times `(m,)`.
-        """
-        if self.constraints:
-            starts, ends = self.segments(u, system)
-            return starts, ends[:, 0]
-        start = jnp.concatenate([jnp.zeros(1), u])
-        return start[None], self.period(u, system)[None]
-
-    def hit(self) -> Int[Array, " m"]:
-        """Return the index of the constraint that ends each flight.
-
-        Returns:
-            Shape `(m,)`.
-        """
-        return jnp.asarray(self.constraints[1:] + self.constraints[:1])
-
-    def arrivals(self, system: HybridSystem, starts, ends) -> Float[Array, "m n"]:
-        """Return the states before the impacts that end the flights.
-
-        Args:
-            system: The system.
-            starts: Starts of the flights, `(m, 1 + n)`.
-            ends: End times, `(m,)` (s).
-
-        Returns:
-            Shape `(m, n)`.
-        """
-        return jax.vmap(
-            lambda a, b: flight_end(system, a[0], a[1:], b[0], steps=self.steps)
-        )(starts, ends)
-
-    def speeds(self, system: HybridSystem, ends, before) -> Float[Array, " m"]:
-        """Return the approach speeds of the impacts.
-
-        Args:
-            system: The system.
-            ends: Times of the impacts, `(m,)` (s).
-            before: States before the impacts, `(m, n)`.
-
-        Returns:
-            Shape `(m,)`.
-        """
-        found = jax.vmap(lambda t, x, which: -normal_velocity(system, t, x)[which])(
-            ends, before, self.hit()
-        )
-        # the flight of row k ends in impact k + 1
-        return jnp.roll(found, 1)
-
-    # -- admissibility
-
-    def seen(self, u, system: HybridSystem) -> Seen:
-        """Return lowest gaps, approach speeds and the error from one integration of the
-        flights.
-
-        For derivatives, use `gap_or_speed`.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
-
-        Returns:
-            A [`variational.orbits.Seen`][].
-        """
-        starts, ends = self.flights(u, system)
-
-        def one(start, end):
-            nodes = nodes_of(system, start, end, self.steps)
-            gap = lowest_times(
-                system, start, end, self.steps, not self.constraints, nodes
-            )[1]
-            return *nodes, jnp.min(gap)
-
-        times, states, wrong, lowest = jax.vmap(one)(starts, ends)
-        speeds = jnp.zeros(0)
-        if self.constraints:
-            speeds = self.speeds(system, ends, states[:, -1])
-        start, period = starts[0], self.period(u, system)
-        size = jnp.min(gap_sizes(system, start[0], start[1:], period))
-        return Seen(lowest, speeds, jnp.max(wrong), size, times, states)
-
-    def approach(self, u, system: HybridSystem) -> Float[Array, " m"]:
-        """Return the approach speed of each impact; differentiable.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
-
-        Returns:
-            Shape `(m,)`.
-        """
-        starts, ends = self.segments(u, system)
-        return self.speeds(system, ends[:, 0], self.arrivals(system, starts, ends))
-
-    def gap_or_speed(self, number, u, system: HybridSystem) -> Float[Array, ""]:
-        """Return the lowest gap of a flight or the speed of an impact; differentiable.
-
-        Args:
-            number: Index of the flight, or m plus the index of the impact.
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
-
-        Returns:
-            A scalar.
-        """
-        starts, ends = self.flights(u, system)
-        hit = self.hit() if self.constraints else None
-        return gap_or_speed(system, starts, ends, number, hit, self.steps)
-
-    def stroboscopic(self, u, system: HybridSystem, seen: Seen):
-        """Return the states at time zero and at each later forcing period.
-
-        Args:
-            u: Unknowns of the equations, shape `(u,)`.
-            system: The system.
-            seen: The flights, from `seen`.
-
-        Returns:
-            Shape `(periods, n)`.
-        """
-        times, states = seen.times, seen.states
-        length = self.periods * system.period
-
-        def at(time):
-            ago = jnp.mod(time - times[:, 0], length)
-            last = jnp.argmin(ago)
-            when = times[last, 0] + ago[last]
-            k = jnp.searchsorted(times[last], when, side="right") - 1
-            k = jnp.clip(k, 0, self.steps - 1)
-            return flight_nodes(system, times[last, k], states[last, k], when, 1)[1][-1]
-
-        turns = jnp.arange(self.periods, dtype=jnp.float64)
-        return jax.vmap(at)(system.period * turns)
+    @property
+    def hits(self) -> AnyArray:
+        """Constraint hit by each impact, then zeros, shape `(rows,)`."""
+        return self.constraints
