@@ -12,9 +12,8 @@ from ._parameter import as_arguments, leaf_of
 from ._passed import corners, located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
 from ._program import Corrected, evaluate
-from ._solution import point_of, Solution, solution_at
+from ._solution import changes_of, point_of, Solution, solution_at, stations
 from ._step import attempt_step, StepAttempt
-from .predictors import Station
 from .problem import AbstractProblem
 from .special import ahead, BRANCH_POINT, Located
 from .step_control import Refusal
@@ -43,6 +42,8 @@ class Run:
         self.direction = direction
         self.label = 0
         self.pending: list[Point] = []
+        # special points at which the problem has changed
+        self.changes: list[Point] = []
         self.past = Past(context.leaf)
 
     # Beginning
@@ -69,6 +70,10 @@ class Run:
         z = np.append(np.asarray(start.state, float), p)
         problem = with_parameter(problem, self.context.leaf, p)
         problem = problem.refreshed(z[:-1], problem.parameters)
+        if start.kind:
+            here = evaluate(problem, self.context, z, np.asarray(start.tangent))
+            at_start = solution_at(problem, self.context.leaf, here, 0.0, arclength)
+            self.pending.append(self._point(at_start, start.kind, start.reason))
         if start.tangent is not None:
             at, step = leave(problem, self.context, z, start)
         else:
@@ -76,7 +81,7 @@ class Run:
             step = start.step
         step = self.context.settings.step if step is None else step
         current = solution_at(problem, self.context.leaf, at, step, arclength)
-        point = self._point(current, kind, start.reason)
+        point = self._point(current, kind, "" if start.kind else start.reason)
         refusal = current.problem.check(point)
         if refusal is not None:
             raise ValueError(f"the start is not admissible: {refusal}")
@@ -106,6 +111,7 @@ class Run:
                 if point.signature != problem.signature:
                     before = problem.with_signature(point.signature)
                 self.past.add(before, point)
+        self.changes = changes_of([p for p in (*history, start)])
         return current
 
     # Stepping
@@ -153,7 +159,7 @@ class Run:
                 self.context,
                 self.algorithm,
                 current.at,
-                self._stations(current),
+                stations(current, self.algorithm.predictor.stations),
                 step,
                 self.name,
             )
@@ -199,15 +205,6 @@ class Run:
         if not corners(current, following):
             return attempted
         return StepAttempt(attempted.solution, attempted.bound, _CORNER * usual)
-
-    def _stations(self, current: Solution) -> list[Station]:
-        """Return the last points, scaled as at the current point."""
-        scale = current.at.scale
-        wanted = max(self.algorithm.predictor.stations, 1)
-        trail = (*current.trail, (current.at.z, current.at.tangent))[-wanted:]
-        return [
-            Station(z / scale, v / scale / np.linalg.norm(v / scale)) for z, v in trail
-        ]
 
     def _moved(self, current: Solution, at: Corrected, step: float) -> Solution:
         length = float(np.linalg.norm((at.z - current.at.z) / current.at.scale))
@@ -320,7 +317,10 @@ class Run:
 
     def _transition(self, current: Solution, point: Point, stood: Solution):
         """Continue with another problem beyond a point, or end there."""
-        start = current.problem.transition(point, stood.at)
+        self.changes.append(point)
+        start = current.problem.accumulation(self.changes)
+        if start is None:
+            start = current.problem.transition(point, stood.at)
         if start is None:
             return None, f"{point.kind} ends the branch"
         towards = current.at.tangent[-1]

@@ -1,5 +1,7 @@
 """The solution that a run has reached, and its conversion to a point."""
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +9,7 @@ import numpy as np
 from ._context import Context
 from ._point import Point, with_parameter
 from ._program import Corrected
+from .predictors import Station
 from .problem import AbstractProblem
 from .special import eigenvalues_at, is_stable, test_values, varied
 
@@ -74,3 +77,15 @@ def point_of(
         problem=with_parameter(problem, context.leaf, z[-1]),
         leaf=context.leaf,
     )
+
+
+def stations(current: Solution, wanted: int) -> list[Station]:
+    """Return the last points, at least one, scaled as at the current point."""
+    scale = current.at.scale
+    trail = (*current.trail, (current.at.z, current.at.tangent))[-max(wanted, 1) :]
+    return [Station(z / scale, v / scale / np.linalg.norm(v / scale)) for z, v in trail]
+
+
+def changes_of(points: Sequence[Point]) -> list[Point]:
+    """Return the special points at which the problem of a branch changes."""
+    return [a for a, b in pairwise(points) if a.special and a.signature != b.signature]

@@ -1,9 +1,7 @@
-"""Problems, defined by a residual and a kind of stability, and the start of a
-branch.
-"""
+"""Problems, defined by a residual and a kind of stability."""
 
 import abc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -19,36 +17,8 @@ from ._local_dynamics import (
 )
 from ._monitor import Monitor as Monitor
 from ._padding import Padded
+from ._start import Start as Start
 from .representation import AbstractRepresentation, Unique
-
-
-class Start(eqx.Module):
-    """The start of a branch: a problem, a state, and optionally a direction.
-
-    Examples:
-        >>> import continuation
-        >>> problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
-        >>> start = continuation.Start(problem, np.ones(1), parameter=1.0)
-        >>> next(continuation.follow(problem, start, "a", (-1, 2))).parameter
-        1.0
-    """
-
-    problem: "AbstractProblem"
-    """The problem to follow."""
-    state: np.ndarray
-    """State on or near the branch, shape `(n,)`."""
-    parameter: float | None = None
-    """Value of the parameter; default: that of `problem.parameters`."""
-    tangent: np.ndarray | None = None
-    """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length
-    does not matter. The first point is searched for in the plane perpendicular to it,
-    so that at a branch point the new branch is found and not the known one. Default:
-    along the branch through `state`, in the requested direction.
-    """
-    step: float | None = None
-    """First step; default: that of the settings."""
-    reason: str = eqx.field(static=True, default="")
-    """A remark on the first point."""
 
 
 class AbstractProblem(eqx.Module):
@@ -295,6 +265,20 @@ class AbstractProblem(eqx.Module):
             A `Start`, or None if there is no continuation.
         """
         del point, at
+        return None
+
+    def accumulation(self, points: Sequence[Any]) -> Start | None:
+        """Return the problem beyond infinitely many transitions, if they accumulate.
+
+        It is called before `transition`.
+
+        Args:
+            points: The special points at which the problem has changed so far.
+
+        Returns:
+            A `Start` at the accumulation, or None.
+        """
+        del points
         return None
 
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":

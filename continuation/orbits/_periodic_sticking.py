@@ -30,6 +30,7 @@ from variational.orbits import flight_end
 from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ._behind_interruption import orbit_behind
 from ._shooting import ImpactingOrbits
+from ._watched import INTERRUPTION
 
 
 CHATTER = "chatter margin"
@@ -37,6 +38,8 @@ CHATTER = "chatter margin"
 DETACHMENT = "jerk at release"
 # number of eighth-order Runge-Kutta steps in a part of one forcing period
 _STEPS = 64
+# largest number of impacts between release and the end of a period
+_IMPACTS = 2000
 
 
 class StickingOrbits(AbstractProblem):
@@ -58,8 +61,7 @@ class StickingOrbits(AbstractProblem):
         the detachment point (valve float); beyond it, contact never ends.
 
     Beyond a zero of the first monitor, a branch continues with
-    [`continuation.ImpactingOrbits`][] if `beyond` is set; a program must then be
-    compiled for each number of impacts.
+    [`continuation.ImpactingOrbits`][] if `beyond` is set.
 
     Examples:
         >>> import continuation
@@ -119,7 +121,7 @@ class StickingOrbits(AbstractProblem):
 
     def monitors(self) -> Mapping[str, Monitor]:
         return {
-            CHATTER: Monitor("interruption of chatter", ends=True, bracket=True),
+            CHATTER: Monitor(INTERRUPTION, ends=True, bracket=True),
             DETACHMENT: Monitor("detachment", ends=True),
         }
 
@@ -191,22 +193,24 @@ def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n
     first = jnp.ceil(turn.frame.release / period)
 
     def hop(carry):
-        _, (time, state, speed), _ = carry
+        _, (time, state, speed), _, count = carry
         point = next_impact(system, time, state, speed, 2 * period)
-        return (time, state), (point.time, point.state, point.speed), point.found
+        after = (point.time, point.state, point.speed)
+        return (time, state), after, point.found, count + 1
 
-    # a complete sequence has no end, but `end` is then before its accumulation
+    # a complete sequence has no end, but `end` is then before its accumulation, unless
+    # that is not a number
     begin = (turn.frame.release, turn.frame.state)
-    start = (begin, (*begin, jnp.zeros(())), jnp.asarray(True))
+    start = (begin, (*begin, jnp.zeros(())), jnp.asarray(True), 0)
 
     def at(end):
         sticks = end >= turn.accumulation
 
         def goes_on(carry):
-            _, (time, _, _), found = carry
-            return ~sticks & found & (time < end)
+            _, (time, _, _), found, count = carry
+            return ~sticks & found & (time < end) & (count < _IMPACTS)
 
-        (time, state), _, _ = jax.lax.while_loop(goes_on, hop, start)
+        (time, state), *_ = jax.lax.while_loop(goes_on, hop, start)
         flown = flight_end(system, time, state, end, steps=_STEPS)
         in_contact = contact_state(system, end[None], turn.frame.state)[0]
         return jnp.where(sticks, in_contact, flown)

@@ -1,6 +1,6 @@
 """Periodic orbits with impacts as a continuation problem."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -14,12 +14,13 @@ from variational.orbits import inadmissible, Shooting
 from .._padding import Padded
 from ..problem import AbstractProblem, Monitor, Start
 from ..special import FLIP
+from ._accumulation import accumulation
 from ._impact_sequences import ImpactSequences
 from ._orbit_equations import AbstractOrbits, PaddedOrbits
 from ._orbit_grazing import orbit_grazing
 from ._run_twice import run_twice
 from ._shooting_graze import multipliers_of
-from ._watched import monitors_of, watched_of
+from ._watched import INTERRUPTION, monitors_of, watched_of
 
 
 _ROWS = 16
@@ -132,6 +133,23 @@ class ImpactingOrbits(AbstractOrbits):
             return self._doubled(point)
         return orbit_grazing(self, point)
 
+    def accumulation(self, points: Sequence[Any]) -> Start | None:
+        # each of the two problems leads to the other
+        from ._periodic_sticking import on_release
+
+        found = accumulation(self, points)
+        if found is None:
+            return None
+        system, value, distance = found
+        problem, state = on_release(system, self.periods)
+        tangent = np.append(np.zeros_like(state), np.sign(distance))
+        step = abs(distance) / float(points[-1].scale[-1])
+        reason = (
+            "infinitely many grazing bifurcations, each with one more impact, "
+            "accumulate here; continued with the orbit that sticks"
+        )
+        return Start(problem, state, value, tangent, step, reason, INTERRUPTION)
+
     def _doubled(self, point: Any) -> Start:
         u = jnp.asarray(point.state)
         parameters = point.problem.parameters
@@ -171,6 +189,11 @@ class ImpactingOrbits(AbstractOrbits):
 
     def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
+        if words[0] == "sticks":
+            from ._periodic_sticking import StickingOrbits
+
+            sticking = StickingOrbits(self.parameters, self.periods)
+            return sticking.with_signature(signature)
         if words[0::2] != ["impacts", "periods", "steps"]:
             return super().with_signature(signature)
         hits = () if words[1] == "-" else tuple(map(int, words[1].split(".")))

@@ -6,6 +6,10 @@ from typing import Literal, NamedTuple
 from .._monitor import Monitor
 
 
+INTERRUPTION = "interruption of chatter"
+"""Kind of the special point at which chatter is complete exactly at release."""
+
+
 class Watched(NamedTuple):
     """The lowest gap within a flight, or the approach speed of an impact."""
 

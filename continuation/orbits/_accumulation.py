@@ -1,0 +1,74 @@
+"""Detect grazing bifurcations that accumulate where chatter becomes complete.
+
+Each of them adds one impact, and the distances between them decrease geometrically.
+Their limit is the interruption of the chatter of an orbit that sticks, which is
+computed independently.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxcam.parameters import as_arrays
+from variational import chatter_interruption
+
+from .._parameter import leaf_of, with_leaf
+
+
+# number of successive grazing bifurcations
+_LEAST = 8
+# allowed change of the ratio of successive distances
+_STEADY = 0.02
+# allowed distance between the interruption and the limit of the bifurcations, relative
+# to the distance of the last one from it
+_AGREES = 0.5
+
+
+class Accumulation(NamedTuple):
+    """The interruption of chatter at which grazing bifurcations accumulate."""
+
+    system: Any
+    """The system there."""
+    value: float
+    """The parameter there."""
+    distance: float
+    """Change of the parameter from the last bifurcation."""
+
+
+def accumulation(problem: Any, points: Sequence[Any]) -> Accumulation | None:
+    """Return where grazing bifurcations accumulate, or None if they do not.
+
+    `problem` is an `ImpactingOrbits`, and `points` are the bifurcations so far.
+    """
+    last = points[-_LEAST:]
+    if len(last) < _LEAST or problem.periods == 0:
+        return None
+    orbits = [problem.with_signature(point.signature) for point in last]
+    impacts = np.array([len(orbit.constraints) for orbit in orbits])
+    values = np.array([point.parameter for point in last])
+    distances = np.diff(values)
+    ratios = distances[1:] / distances[:-1]
+    if np.any(np.diff(impacts) != 1) or not np.all((ratios > 0) & (ratios < 1)):
+        return None
+    if abs(ratios[-1] - ratios[-2]) > _STEADY:
+        return None
+    rest = float(distances[-1] * ratios[-1] / (1 - ratios[-1]))
+    leaf = last[-1].leaf
+    system = as_arrays(last[-1].solved.parameters)
+    bracket = (float(values[-1]), float(values[-1]) + 2 * rest)
+    try:
+        found = chatter_interruption(
+            system,
+            lambda parameters: leaf_of(parameters, leaf),
+            bracket,
+            problem.periods,
+        )
+    except ValueError:
+        return None
+    value = float(found)
+    if abs(value - values[-1] - rest) > _AGREES * abs(rest):
+        return None
+    moved = with_leaf(system, leaf, jnp.asarray(value))
+    return Accumulation(moved, value, value - float(values[-1]))

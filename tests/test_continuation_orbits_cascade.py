@@ -1,0 +1,116 @@
+"""From one impact a period to complete chatter: grazing bifurcations that accumulate,
+and compiled programs that serve any number of impacts.
+
+Truth: a simulation, the interruption computed by itself, the wall at -1 that the
+forcing can never lift the mass from.
+"""
+
+import numpy as np
+import pytest
+from test_continuation_orbits_walls import Walls
+
+import continuation
+import variational
+from continuation import BranchSettings
+from continuation._context import Context
+from continuation._program import correct
+from jaxcam.models import ImpactOscillator
+from jaxcam.parameters import as_arrays
+
+
+OMEGA = 2.0
+
+
+def oscillator(wall):
+    return ImpactOscillator(wall=wall, omega=OMEGA)
+
+
+@pytest.fixture(scope="module")
+def cascade():
+    system = as_arrays(oscillator(-0.04))
+    return continuation.branch(system, None, "wall", (-1.2, 0.0), direction=-1)
+
+
+def impacts(point):
+    return len(point.problem.constraints)
+
+
+def test_every_grazing_adds_one_impact(cascade):
+    """Eight in a row, at walls ever closer to each other."""
+    grazings = cascade.of_kind("grazing")
+    assert [impacts(point) for point in grazings] == list(range(1, 9))
+    assert np.all(np.diff([p.parameter for p in grazings], 2) > 0)
+
+
+def test_a_stable_orbit_with_five_impacts_is_that_of_a_simulation(cascade):
+    """Period and impacts of the event loop; states to 1e-8."""
+    five = [p for p in cascade.points if p.signature.startswith("impacts 0.0.0.0.0 ")]
+    point = next(p for p in five if p.stable)
+    system = oscillator(point.parameter)
+    observed = point.observed
+    orbit = variational.orbit_of(
+        system,
+        observed["stroboscopic"][0],
+        float(observed["period"]),
+        0.0,
+    )
+    assert int(orbit.impacts.count) == 5
+    after = np.asarray(orbit.impacts.after)
+    rows = point.state.reshape(5, 3)
+    order = np.argsort(np.mod(rows[:, 0], 1.0))
+    assert np.max(np.abs(after - rows[order, 1:])) < 1e-8
+
+
+def test_the_cascade_ends_at_the_interruption_of_chatter(cascade):
+    """It is where the chatter theory puts it, to 1e-12, and the sticking orbit beyond
+    ends where the wall is at -1, beyond which the forcing cannot lift the mass.
+    """
+    (point,) = cascade.of_kind("interruption of chatter")
+    wall = variational.chatter_interruption(oscillator(0.0), "wall", (-0.85, -0.8))
+    assert abs(point.parameter - float(wall)) < 1e-12
+    assert "accumulate here" in point.reason
+    (detached,) = cascade.of_kind("detachment")
+    assert abs(detached.parameter + 1.0) < 1e-9
+    between = [p for p in cascade.points if point.label < p.label < detached.label]
+    assert between and all(p.stable for p in between)
+
+
+def test_a_branch_goes_on_from_a_point_of_the_cascade(cascade):
+    """The points behind the interruption, and those with three impacts, again."""
+    sticking = [p for p in cascade.points if p.signature.startswith("sticks")]
+    third = [p for p in cascade.points if p.signature.startswith("impacts 0.0.0 ")]
+    start = cascade.points[0]
+    for point in (sticking[2], third[2]):
+        again = continuation.follow(
+            start.problem,
+            point,
+            "wall",
+            (-1.2, 0.0),
+            history=cascade.points[: point.label],
+        )
+        following = next(p for p in again)
+        (known,) = (p for p in cascade.points if p.label == following.label)
+        assert following.parameter == known.parameter
+        assert np.array_equal(following.state, known.state)
+
+
+@pytest.mark.parametrize("system", [Walls(), oscillator(-0.04)])
+def test_padding_does_not_change_an_orbit(system, monkeypatch):
+    """An orbit and its derivatives with 16 rows of unknowns, and with one for each
+    impact, to 1e-10.
+    """
+    start = continuation.periodic_orbits(system)
+    z = np.append(start.state, float(system.omega))
+    context = Context(0, 1.0, BranchSettings())
+    across = np.append(np.zeros_like(start.state), 1.0)
+    assert start.problem.padded().size == 16 * 3
+    wide = correct(start.problem, context, z, across, across)
+    monkeypatch.setattr(continuation.ImpactingOrbits, "padded", lambda self: None)
+    exact = correct(start.problem, context, z, across, across)
+    assert wide.success and exact.success
+    for name in ("z", "jacobian", "linearisation", "tangent", "determinant", "scale"):
+        a, b = getattr(wide, name), getattr(exact, name)
+        assert np.max(np.abs(a - b)) < 1e-10 * (1 + np.max(np.abs(b))), name
+    assert wide.monitors.keys() == exact.monitors.keys()
+    for name, value in exact.monitors.items():
+        assert abs(wide.monitors[name] - value) < 1e-10, name
