@@ -15,6 +15,8 @@ class Padded(NamedTuple):
     """Position of each original unknown among them, shape `(n,)`."""
     size: int
     """Number of unknowns including the additional ones."""
+    lengths: dict[str, int] = {}
+    """Number of rows of observed quantities that are not padding, by name."""
 
     def positions(self, count: int) -> np.ndarray:
         """Return the positions of the original unknowns and of those behind all, for a

@@ -200,6 +200,10 @@ def _narrowed(at: Corrected, padded: Padded, problem: AbstractProblem) -> Correc
         determinant=determinant,
         scale=at.scale[kept],
         monitors={name: at.monitors[name] for name in problem.monitors()},
+        observed={
+            name: value[: padded.lengths[name]] if name in padded.lengths else value
+            for name, value in at.observed.items()
+        },
     )
 
 

@@ -94,12 +94,27 @@ def test_a_branch_goes_on_from_a_point_of_the_cascade(cascade):
         assert np.array_equal(following.state, known.state)
 
 
-@pytest.mark.parametrize("system", [Walls(), oscillator(-0.04)])
-def test_padding_does_not_change_an_orbit(system, monkeypatch):
+def once(system):
+    return continuation.periodic_orbits(system)
+
+
+def twice(system):
+    """The orbit as one of two periods."""
+    start = once(system)
+    problem = continuation.ImpactingOrbits(system, (0, 0), 2, 2, start.problem.steps)
+    later = start.state + np.array([1.0, 0.0, 0.0])
+    return continuation.Start(problem, np.concatenate([start.state, later]))
+
+
+@pytest.mark.parametrize(
+    ("system", "represented"),
+    [(Walls(), once), (oscillator(-0.04), once), (oscillator(-0.04), twice)],
+)
+def test_padding_does_not_change_an_orbit(system, represented, monkeypatch):
     """An orbit and its derivatives with 16 rows of unknowns, and with one for each
     impact, to 1e-10.
     """
-    start = continuation.periodic_orbits(system)
+    start = represented(as_arrays(system))
     z = np.append(start.state, float(system.omega))
     context = Context(0, 1.0, BranchSettings())
     across = np.append(np.zeros_like(start.state), 1.0)
@@ -111,6 +126,8 @@ def test_padding_does_not_change_an_orbit(system, monkeypatch):
     for name in ("z", "jacobian", "linearisation", "tangent", "determinant", "scale"):
         a, b = getattr(wide, name), getattr(exact, name)
         assert np.max(np.abs(a - b)) < 1e-10 * (1 + np.max(np.abs(b))), name
+    strobe = [at.observed["stroboscopic"] for at in (wide, exact)]
+    np.testing.assert_allclose(*strobe, rtol=0, atol=1e-10)
     assert wide.monitors.keys() == exact.monitors.keys()
     for name, value in exact.monitors.items():
         assert abs(wide.monitors[name] - value) < 1e-10, name

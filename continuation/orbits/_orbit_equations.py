@@ -50,7 +50,7 @@ class AbstractOrbits(AbstractProblem):
         return self._returned(u, parameters, matrix)
 
     def _returned(self, u, parameters, matrix):
-        if self.equations.periods:
+        if self.equations.forced:
             return matrix
         return orbits.return_map(self.equations, u, parameters, matrix)
 
@@ -114,7 +114,7 @@ class AbstractOrbits(AbstractProblem):
             "integration error": seen.error,
             "gap size": seen.gap_size,
         }
-        if self.equations.periods:
+        if self.equations.forced:
             found["stroboscopic"] = equations.stroboscopic(u, parameters, seen)
         rows = {"gap": seen.gaps, "speed": seen.speeds}
         monitors = {

@@ -11,7 +11,7 @@ from jaxcam.hybrid import HybridSystem
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
-from .._padding import Padded
+from .._padding import as_compiled, Padded
 from ..problem import AbstractProblem, Monitor, Start
 from ..special import FLIP
 from ._accumulation import accumulation
@@ -24,7 +24,7 @@ from ._watched import INTERRUPTION, monitors_of, watched_of
 
 
 _ROWS = 16
-"""Programs are compiled for multiples of this number of impacts."""
+"""Programs are compiled for multiples of this number of impacts and periods."""
 
 
 class ImpactingOrbits(AbstractOrbits):
@@ -85,11 +85,12 @@ class ImpactingOrbits(AbstractOrbits):
 
     def padded(self) -> Padded | None:
         m, row = len(self.constraints), 1 + self.dimension
-        rows = -(-m // _ROWS) * _ROWS
-        if rows == m:
+        if not m:
             return None
-        wide = PaddedOrbits(self.parameters, self.equations.padded(rows))
-        return Padded(wide, np.arange(m * row), rows * row)
+        rows, periods = (-(-number // _ROWS) * _ROWS for number in (m, self.periods))
+        wide = PaddedOrbits(self.parameters, self.equations.padded(rows, periods))
+        lengths = {"stroboscopic": self.periods}
+        return Padded(wide, np.arange(m * row), rows * row, lengths)
 
     # -- monitors
 
@@ -153,7 +154,10 @@ class ImpactingOrbits(AbstractOrbits):
     def _doubled(self, point: Any) -> Start:
         u = jnp.asarray(point.state)
         parameters = point.problem.parameters
-        matrix = np.asarray(_antiperiodic(self.equations, u, parameters))
+        wide, v = as_compiled(self, u)
+        # the rows and columns of padding come last
+        matrix = np.asarray(_antiperiodic(wide.equations, v, parameters))
+        matrix = matrix[: u.size, : u.size]
         deviation = np.linalg.svd(matrix)[2][-1]
         state, tangent = run_twice(self, np.asarray(point.state), deviation)
         twice = ImpactingOrbits(

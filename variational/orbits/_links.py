@@ -219,11 +219,11 @@ def equations_and_monodromy(
     row = -jnp.ones(1 + shooting.dimension).at[0].set(-1.0)
     flip = jnp.where(shooting.real[:, None], row, 0.0).reshape(-1)
     # all times are phases times one unit (s)
-    unit = shooting.period(u, system) / max(shooting.periods, 1)
+    unit = shooting.period(u, system) / shooting.turns
     by_unit = jax.vmap(
         lambda one, t0, t1: (one.by_start[:, 0] * t0 + one.by_end * t1) / unit
     )(links, starts[:, 0], ends)
-    if shooting.periods:
+    if shooting.forced:
         rate = jax.jvp(
             lambda p: jnp.asarray(system_at(p).period, dtype=jnp.float64),
             (p,),
@@ -242,7 +242,7 @@ def _column_scale(shooting: AbstractShooting, u, system) -> Float[Array, "1 u"]:
     """Return the factors from derivatives with respect to times (s) to those with
     respect to phases.
     """
-    unit = shooting.period(u, system) / max(shooting.periods, 1)
+    unit = shooting.period(u, system) / shooting.turns
     row = jnp.ones(1 + shooting.dimension).at[0].set(unit)
     return jnp.where(shooting.real[:, None], row, 1.0).reshape(1, -1)
 
@@ -298,9 +298,9 @@ def around_the_period(shooting: AbstractShooting, u, system: HybridSystem):
         begin = (start, jnp.eye(start.size))
         return jax.lax.fori_loop(0, shooting.number, hop, begin)[1]
 
-    if shooting.periods == 0:
+    if not shooting.forced:
         return lambda x: whole_turn(jnp.append(starts[0, :1], x))[1:, 1:], starts[0, 1:]
-    unit = shooting.period(u, system) / shooting.periods
+    unit = shooting.period(u, system) / shooting.turns
     sizes = jnp.ones(starts.shape[1]).at[0].set(unit)
 
     def of_phase(y):

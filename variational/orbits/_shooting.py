@@ -28,6 +28,16 @@ class Shooting(AbstractShooting):
     """Number of eighth-order Runge-Kutta steps in each flight."""
 
     @property
+    def forced(self) -> bool:
+        """Whether the system is forced."""
+        return self.periods > 0
+
+    @property
+    def most_periods(self) -> int:
+        """Number of forcing periods."""
+        return self.periods
+
+    @property
     def rows(self) -> int:
         """Number of impacts."""
         return len(self.constraints)
@@ -42,32 +52,34 @@ class Shooting(AbstractShooting):
         """Constraint hit by each impact, shape `(m,)`."""
         return np.array(self.constraints, int)
 
-    def padded(self, rows: int) -> "PaddedShooting":
+    def padded(self, rows: int, most_periods: int) -> "PaddedShooting":
         """Return the same equations with this number of rows.
 
         Args:
             rows: Number of rows, at least the number of impacts, which must not be
                 zero.
+            most_periods: Upper bound of the number of periods.
 
         Returns:
             A [`variational.orbits.PaddedShooting`][].
         """
         hits = np.zeros(rows, int)
         hits[: self.number] = self.constraints
-        number = np.asarray(self.number)
-        return PaddedShooting(hits, self.periods, self.dimension, self.steps, number)
+        periods, number = np.asarray(self.periods), np.asarray(self.number)
+        most = most_periods if self.forced else 0
+        return PaddedShooting(hits, periods, self.dimension, self.steps, number, most)
 
 
 class PaddedShooting(AbstractShooting):
     """The equations of [`variational.orbits.Shooting`][] with rows of padding.
 
-    The number of impacts and their constraints are arrays, so that orbits with
-    different impacts share one compiled program.
+    The numbers of impacts and periods and the constraints are arrays, so that orbits
+    with different impacts share one compiled program.
     """
 
     constraints: AnyArray
     """Constraint hit by each impact, then zeros, shape `(rows,)`."""
-    periods: int = eqx.field(static=True)
+    periods: AnyArray
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: int = eqx.field(static=True)
     """Number of states n."""
@@ -75,6 +87,18 @@ class PaddedShooting(AbstractShooting):
     """Number of eighth-order Runge-Kutta steps in each flight."""
     impacts: AnyArray
     """Number of impacts."""
+    capacity: int = eqx.field(static=True)
+    """Upper bound of the number of periods; 0 without forcing."""
+
+    @property
+    def forced(self) -> bool:
+        """Whether the system is forced."""
+        return self.capacity > 0
+
+    @property
+    def most_periods(self) -> int:
+        """Upper bound of the number of periods."""
+        return self.capacity
 
     @property
     def rows(self) -> int:

@@ -57,7 +57,8 @@ class AbstractShooting(eqx.Module):
     """
 
     constraints: eqx.AbstractVar[Any]
-    periods: eqx.AbstractVar[int]
+    periods: eqx.AbstractVar[Any]
+    """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: eqx.AbstractVar[int]
     steps: eqx.AbstractVar[int]
 
@@ -68,6 +69,16 @@ class AbstractShooting(eqx.Module):
 
     @property
     @abc.abstractmethod
+    def forced(self) -> bool:
+        """Whether the system is forced (static)."""
+
+    @property
+    @abc.abstractmethod
+    def most_periods(self) -> int:
+        """Upper bound of `periods` (static)."""
+
+    @property
+    @abc.abstractmethod
     def number(self) -> int | AnyArray:
         """Number of impacts."""
 
@@ -75,6 +86,11 @@ class AbstractShooting(eqx.Module):
     @abc.abstractmethod
     def hits(self) -> AnyArray:
         """Constraint hit by each impact, shape `(rows,)`."""
+
+    @property
+    def turns(self) -> Float[Array, ""]:
+        """Number of periods of the phases: of the forcing, or of the orbit."""
+        return jnp.asarray(self.periods if self.forced else 1, dtype=jnp.float64)
 
     @property
     def real(self) -> Bool[Array, " rows"]:
@@ -128,9 +144,9 @@ class AbstractShooting(eqx.Module):
         Returns:
             A scalar.
         """
-        if self.periods == 0:
+        if not self.forced:
             return u[0]
-        return jnp.asarray(self.periods * system.period, dtype=jnp.float64)
+        return self.turns * jnp.asarray(system.period, dtype=jnp.float64)
 
     def segments(self, u, system: HybridSystem):
         """Return the starts and ends of the flights: times (s) and states.
@@ -145,12 +161,12 @@ class AbstractShooting(eqx.Module):
             Two arrays, `(rows, 1 + n)` each.
         """
         starts = u.reshape(self.rows, 1 + self.dimension)
-        if self.periods == 0:
+        if not self.forced:
             starts = starts.at[0, 0].set(0.0)
         starts = jnp.where(self.real[:, None], starts, starts[0])
         ends = starts[self.following]
-        ends = ends.at[:, 0].add(jnp.where(self.last, max(self.periods, 1), 0.0))
-        unit = self.period(u, system) / max(self.periods, 1)
+        ends = ends.at[:, 0].add(jnp.where(self.last, self.turns, 0.0))
+        unit = self.period(u, system) / self.turns
         scale = jnp.ones(1 + self.dimension).at[0].set(unit)
         return starts * scale[None, :], ends * scale[None, :]
 
@@ -279,10 +295,10 @@ class AbstractShooting(eqx.Module):
             seen: The flights, from `seen`.
 
         Returns:
-            Shape `(periods, n)`.
+            Shape `(periods, n)`; with padding, further rows follow.
         """
         times, states = seen.times, seen.states
-        length = self.periods * system.period
+        length = self.turns * system.period
 
         def at(time):
             ago = jnp.mod(time - times[:, 0], length)
@@ -292,5 +308,5 @@ class AbstractShooting(eqx.Module):
             k = jnp.clip(k, 0, self.steps - 1)
             return flight_nodes(system, times[last, k], states[last, k], when, 1)[1][-1]
 
-        turns = jnp.arange(self.periods, dtype=jnp.float64)
+        turns = jnp.arange(self.most_periods, dtype=jnp.float64)
         return jax.vmap(at)(system.period * turns)
