@@ -16,7 +16,6 @@ from jaxcam.hybrid.surface import (
     normal_acceleration,
     normal_velocity,
 )
-from variational import chatter_frame
 from variational.chatter import (
     ChatterFrame,
     ChatterOrbit,
@@ -29,8 +28,10 @@ from variational.orbits import flight_end
 
 from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ._behind_interruption import orbit_behind
+from ._kinds import add_kind
+from ._release import release_of
 from ._shooting import ImpactingOrbits
-from ._watched import INTERRUPTION
+from ._watched import INTERRUPTION, STICKS
 
 
 CHATTER = "chatter margin"
@@ -176,8 +177,8 @@ class StickingOrbits(AbstractProblem):
     @property
     def signature(self) -> str:
         if self.periods == 1:
-            return "sticks once per period"
-        return f"sticks once in {self.periods} periods"
+            return f"{STICKS} once per period"
+        return f"{STICKS} once in {self.periods} periods"
 
     def with_signature(self, signature: str) -> AbstractProblem:
         if signature.startswith("impacts"):
@@ -227,17 +228,7 @@ def on_release(
     Raises:
         ValueError: Contact never ends, or never begins.
     """
-    frame = _frame(system)
-    if not bool(jnp.isfinite(frame.release)):
-        raise ValueError(
-            "this system has no release from contact in its period, so no orbit sticks "
-            "for part of it; check the parameters"
-        )
-    phase = float(frame.release) / float(system.period)  # pyright: ignore
-    problem = StickingOrbits(system, periods, beyond)
-    return problem, np.append(phase, np.asarray(frame.state))
+    return StickingOrbits(system, periods, beyond), release_of(system)
 
 
-@eqx.filter_jit
-def _frame(system):
-    return chatter_frame(system)
+add_kind(STICKS, StickingOrbits)

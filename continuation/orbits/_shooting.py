@@ -16,11 +16,13 @@ from ..problem import AbstractProblem, Monitor, Start
 from ..special import FLIP
 from ._accumulation import accumulation
 from ._impact_sequences import ImpactSequences
+from ._kinds import orbits_of_kind
 from ._orbit_equations import AbstractOrbits, PaddedOrbits
 from ._orbit_grazing import orbit_grazing
+from ._release import release_of
 from ._run_twice import run_twice
 from ._shooting_graze import multipliers_of
-from ._watched import INTERRUPTION, monitors_of, watched_of
+from ._watched import INTERRUPTION, monitors_of, STICKS, watched_of
 
 
 _ROWS = 16
@@ -135,14 +137,14 @@ class ImpactingOrbits(AbstractOrbits):
         return orbit_grazing(self, point)
 
     def accumulation(self, points: Sequence[Any]) -> Start | None:
-        # each of the two problems leads to the other
-        from ._periodic_sticking import on_release
-
         found = accumulation(self, points)
         if found is None:
             return None
         system, value, distance = found
-        problem, state = on_release(system, self.periods)
+        problem, state = (
+            orbits_of_kind(STICKS, system, self.periods),
+            release_of(system),
+        )
         tangent = np.append(np.zeros_like(state), np.sign(distance))
         step = abs(distance) / float(points[-1].scale[-1])
         reason = (
@@ -193,10 +195,8 @@ class ImpactingOrbits(AbstractOrbits):
 
     def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
-        if words[0] == "sticks":
-            from ._periodic_sticking import StickingOrbits
-
-            sticking = StickingOrbits(self.parameters, self.periods)
+        if words[0] == STICKS:
+            sticking = orbits_of_kind(STICKS, self.parameters, self.periods)
             return sticking.with_signature(signature)
         if words[0::2] != ["impacts", "periods", "steps"]:
             return super().with_signature(signature)

@@ -10,6 +10,10 @@ INTERRUPTION = "interruption of chatter"
 """Kind of the special point at which chatter is complete exactly at release."""
 
 
+STICKS = "sticks"
+"""First word of the signature of orbits that stick."""
+
+
 class Watched(NamedTuple):
     """The lowest gap within a flight, or the approach speed of an impact."""
 
