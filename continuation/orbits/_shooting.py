@@ -141,10 +141,8 @@ class ImpactingOrbits(AbstractOrbits):
         if found is None:
             return None
         system, value, distance = found
-        problem, state = (
-            orbits_of_kind(STICKS, system, self.periods),
-            release_of(system),
-        )
+        problem = orbits_of_kind(STICKS, system, self.periods)
+        state = release_of(system)
         tangent = np.append(np.zeros_like(state), np.sign(distance))
         step = abs(distance) / float(points[-1].scale[-1])
         reason = (
