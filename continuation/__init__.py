@@ -10,6 +10,7 @@ from ._curve import curve as curve
 from ._deflate import deflate as deflate
 from ._follow import follow as follow
 from ._limit_cycle import LimitCycle as LimitCycle
+from ._padding import Padded as Padded
 from ._point import Branch as Branch, Point as Point
 from ._problems import (
     Equations as Equations,

@@ -6,7 +6,7 @@ import numpy as np
 from ._context import Context
 from ._point import with_field, with_parameter
 from ._program import correct, Corrected, evaluate
-from .problem import AbstractProblem, Start
+from .problem import AbstractProblem
 
 
 def solved_start(
@@ -37,15 +37,20 @@ def solved_start(
 
 
 def leave(
-    problem: AbstractProblem, context: Context, z: np.ndarray, start: Start
+    problem: AbstractProblem,
+    context: Context,
+    z: np.ndarray,
+    tangent: np.ndarray,
+    step: float,
 ) -> tuple[Corrected, float]:
-    """Return the first point of a branch that leaves z along a tangent."""
+    """Return the first point of a branch that leaves z along a tangent, and its
+    distance, at most `step`.
+    """
     settings = context.settings
     zero = np.zeros_like(z)
     scale = evaluate(problem, context, z, zero + 1.0).scale
-    tangent = np.asarray(start.tangent, float)
+    tangent = np.asarray(tangent, float)
     tangent = tangent / np.linalg.norm(tangent / scale)
-    step = settings.step if start.step is None else start.step
     low, high = context.bounds
     while step >= settings.min_step:
         guess = z + step * tangent

@@ -49,7 +49,7 @@ def follow(
         settings: Accuracy and step control.
         direction: 1 to start towards larger parameters, -1 towards smaller ones.
         history: The points before `start`, if that is a point; predictors that use
-            several points need them.
+            several points and the detection of accumulations need them.
 
     Returns:
         An iterator of [`continuation.Point`][].

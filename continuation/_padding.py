@@ -1,5 +1,7 @@
 """Let problems with different numbers of unknowns share one compiled program."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,7 +9,14 @@ from jaxtyping import Float
 
 
 class Padded(NamedTuple):
-    """A problem with additional unknowns, whose equations are u = 0."""
+    """A problem with additional unknowns, whose equations are u = 0.
+
+    Examples:
+        >>> import continuation
+        >>> padded = continuation.Padded(None, kept=np.arange(2), size=4)
+        >>> padded.widened(np.array([1.0, 2.0, 0.5])).tolist()
+        [1.0, 2.0, 0.0, 0.0, 0.5]
+    """
 
     problem: Any
     """The problem with the additional unknowns."""
@@ -15,12 +24,17 @@ class Padded(NamedTuple):
     """Position of each original unknown among them, shape `(n,)`."""
     size: int
     """Number of unknowns including the additional ones."""
-    lengths: dict[str, int] = {}
+    lengths: Mapping[str, int] = MappingProxyType({})
     """Number of rows of observed quantities that are not padding, by name."""
 
     def positions(self, count: int) -> np.ndarray:
-        """Return the positions of the original unknowns and of those behind all, for a
-        vector of `count` entries.
+        """Return the positions of the original unknowns and of those behind all.
+
+        Args:
+            count: Number of entries of a vector without the additional unknowns.
+
+        Returns:
+            Shape `(count,)`.
         """
         behind = count - self.kept.size
         return np.append(self.kept, self.size + np.arange(behind))
@@ -28,7 +42,12 @@ class Padded(NamedTuple):
     def widened(self, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, " wide"]:
         """Return a vector with zeros for the additional unknowns.
 
-        Entries beyond the n unknowns, such as a parameter, remain at the end.
+        Args:
+            z: The n unknowns and further entries, such as a parameter, which remain at
+                the end.
+
+        Returns:
+            The longer vector.
         """
         wide = np.zeros(self.size + len(z) - self.kept.size)
         wide[self.positions(len(z))] = z

@@ -1,6 +1,6 @@
 """Follow a branch step by step."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -8,14 +8,15 @@ import numpy as np
 from ._begin import leave, solved_start
 from ._closed import closed, Past
 from ._context import Context
+from ._joins import JOINS, joins
 from ._parameter import as_arguments, leaf_of
 from ._passed import corners, located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
 from ._program import Corrected, evaluate
 from ._solution import changes_of, point_of, Solution, solution_at, stations
 from ._step import attempt_step, StepAttempt
-from .problem import AbstractProblem
-from .special import ahead, BRANCH_POINT, Located
+from .problem import AbstractProblem, Start
+from .special import ahead, Located
 from .step_control import Refusal
 
 
@@ -23,13 +24,6 @@ from .step_control import Refusal
 _CORNER = 1e-2
 # number of failures in one place before an end is searched for just ahead
 _HALVINGS = 2
-# an orbit has half the period if its halves differ by less than this, in step lengths;
-# their distance grows with a square root
-HALF = 1e-4
-JOINS = (
-    "the branch rejoins the orbits of half the period at their flip; beyond it, the "
-    "same orbits would be repeated, shifted by half a period"
-)
 
 
 class Run:
@@ -70,21 +64,27 @@ class Run:
         z = np.append(np.asarray(start.state, float), p)
         problem = with_parameter(problem, self.context.leaf, p)
         problem = problem.refreshed(z[:-1], problem.parameters)
+        context = self.context
+        step = context.settings.step if start.step is None else start.step
         if start.kind:
-            here = evaluate(problem, self.context, z, np.asarray(start.tangent))
-            at_start = solution_at(problem, self.context.leaf, here, 0.0, arclength)
+            here = evaluate(problem, context, z, np.asarray(start.tangent))
+            at_start = solution_at(problem, context.leaf, here, step, arclength)
             self.pending.append(self._point(at_start, start.kind, start.reason))
-        if start.tangent is not None:
-            at, step = leave(problem, self.context, z, start)
-        else:
-            at = solved_start(problem, self.context, z, self.name, self.direction)
-            step = start.step
-        step = self.context.settings.step if step is None else step
-        current = solution_at(problem, self.context.leaf, at, step, arclength)
-        point = self._point(current, kind, "" if start.kind else start.reason)
-        refusal = current.problem.check(point)
-        if refusal is not None:
-            raise ValueError(f"the start is not admissible: {refusal}")
+        while True:
+            if start.tangent is not None:
+                at, step = leave(problem, context, z, start.tangent, step)
+            else:
+                at = solved_start(problem, context, z, self.name, self.direction)
+            current = solution_at(problem, context.leaf, at, step, arclength)
+            point = self._point(current, kind, "" if start.kind else start.reason)
+            refusal = current.problem.check(point)
+            if refusal is None:
+                break
+            step /= 2
+            if start.tangent is None or step < context.settings.min_step:
+                raise ValueError(f"the start is not admissible: {refusal}")
+            # the point has no label
+            self.label -= 1
         self.pending.append(point)
         self.past.add(problem, point)
         return self._with_fresh_references(current)._replace(yielded=True)
@@ -105,13 +105,14 @@ class Run:
         current = solution_at(
             problem, context.leaf, at, start.step, start.arclength, trail
         )
-        for point in (*(p for p in history if p.label < start.label), start):
+        known = [*(p for p in history if p.label < start.label), start]
+        for point in known:
             if not point.special:
                 before = problem
                 if point.signature != problem.signature:
                     before = problem.with_signature(point.signature)
                 self.past.add(before, point)
-        self.changes = changes_of([p for p in (*history, start)])
+        self.changes = changes_of(known)
         return current
 
     # Stepping
@@ -256,24 +257,9 @@ class Run:
             self.pending.append(point)
             if self._ends(current, name):
                 return self._transition(current, point, stood)
-            if self._joins(current, point):
+            if joins(current, point):
                 return stood, JOINS
         return None
-
-    def _joins(self, current: Solution, point: Point) -> bool:
-        """Return whether orbits of half the period take over.
-
-        They form a separate branch, which is not followed a second time.
-        """
-        if point.kind != BRANCH_POINT:
-            return False
-        problem, parameters = current.problem, getattr(point.problem, "parameters")
-        half_away = problem.representation.half_away
-        before = half_away(current.at.z[:-1], parameters)
-        away = half_away(point.state, parameters)
-        if before is None or away is None:
-            return False
-        return away < min(HALF, 1e-2 * before)
 
     def _special(
         self, current: Solution, chord, name: str, located: Located
@@ -318,23 +304,31 @@ class Run:
     def _transition(self, current: Solution, point: Point, stood: Solution):
         """Continue with another problem beyond a point, or end there."""
         self.changes.append(point)
-        start = current.problem.accumulation(self.changes)
-        if start is None:
-            start = current.problem.transition(point, stood.at)
-        if start is None:
-            return None, f"{point.kind} ends the branch"
         towards = current.at.tangent[-1]
         self.direction = 1 if towards >= 0 else -1
-        problem = set_parameters(
-            start.problem, as_arguments(start.problem.parameters, self.context.leaf)
+        reason = f"{point.kind} ends the branch"
+        starts: tuple[Callable[[], Start | None], ...] = (
+            lambda: current.problem.accumulation(self.changes),
+            lambda: current.problem.transition(point, stood.at),
         )
-        try:
-            following = self.begin(
-                problem, start, kind="regular", arclength=point.arclength
+        for start_of in starts:
+            start = start_of()
+            if start is None:
+                continue
+            problem = set_parameters(
+                start.problem, as_arguments(start.problem.parameters, self.context.leaf)
             )
-        except ValueError as error:
-            return None, f"{point.kind} ends the branch; beyond it, {error}"
-        return following, ""
+            waiting, label = list(self.pending), self.label
+            try:
+                following = self.begin(
+                    problem, start, kind="regular", arclength=point.arclength
+                )
+            except ValueError as error:
+                self.pending, self.label = waiting, label
+                reason = f"{point.kind} ends the branch; beyond it, {error}"
+            else:
+                return following, ""
+        return None, reason
 
     # Points
 

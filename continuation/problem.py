@@ -37,7 +37,8 @@ class AbstractProblem(eqx.Module):
 
     The other methods have defaults. **Traced** (called inside compiled programs; JAX
     functions, differentiable in forward mode): `residual`, `linearisation`,
-    `derivatives`, `local_dynamics`, `seen`, `watched`, `scale`. All their non-array
+    `derivatives`, `local_dynamics`, `seen`, `watched`, `scale`, `number_of_unknowns`.
+    All their non-array
     data must be static, because one program is compiled for each problem structure and
     reused for all array values in it. `residual` and monitors with `ends=False` must be
     smooth, except for monitors with `corner`; where an orbit does not exist, return
@@ -45,7 +46,8 @@ class AbstractProblem(eqx.Module):
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,
-    `signature`, `with_signature`. They may compile their own programs.
+    `signature`, `with_signature`, `padded`, `accumulation`. They may compile their own
+    programs.
 
     **Order of calls** for a step from point a to point b: first the corrector, then
     `derivatives` and `seen` at b in the same program. If a monitor with `ends` has
@@ -169,7 +171,11 @@ class AbstractProblem(eqx.Module):
         return jnp.broadcast_to(size, u.shape)
 
     def number_of_unknowns(self, u: Float[Array, " n"]) -> Any:
-        """Return the number n of unknowns, without padding."""
+        """Return the number n of unknowns, without padding.
+
+        Returns:
+            A number.
+        """
         return u.size
 
     # -- monitors
@@ -213,8 +219,12 @@ class AbstractProblem(eqx.Module):
     # -- between compiled programs
 
     def padded(self) -> Padded | None:
-        """Return the problem with additional unknowns that compiled programs use, so
-        that problems of different sizes share one; None for the problem itself.
+        """Return the problem with additional unknowns that compiled programs use.
+
+        Problems of different sizes can then share a program.
+
+        Returns:
+            A [`continuation.Padded`][], or None for the problem itself.
         """
         return None
 

@@ -5,6 +5,7 @@ Truth: a simulation, the interruption computed by itself, the wall at -1 that th
 forcing can never lift the mass from.
 """
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_continuation_orbits_walls import Walls
@@ -94,6 +95,41 @@ def test_a_branch_goes_on_from_a_point_of_the_cascade(cascade):
         assert np.array_equal(following.state, known.state)
 
 
+@pytest.mark.parametrize("restitution", [0.2, 0.3])
+def test_a_cascade_at_low_restitution_reaches_chatter_too(restitution):
+    """Its grazing bifurcations approach each other fast; the interruption to 1e-12."""
+    system = ImpactOscillator(wall=-0.04, omega=OMEGA, restitution=restitution)
+    found = continuation.branch(
+        as_arrays(system), None, "wall", (-1.2, 0.0), direction=-1
+    )
+    (point,) = found.of_kind("interruption of chatter")
+    near = (point.parameter - 1e-3, point.parameter + 1e-3)
+    wall = variational.chatter_interruption(system, "wall", near)
+    assert abs(point.parameter - float(wall)) < 1e-12
+    assert len(found.of_kind("grazing")) == 5
+    (detached,) = found.of_kind("detachment")
+    assert abs(detached.parameter + 1.0) < 1e-9
+
+
+def test_orbits_that_stick_are_no_part_of_an_accumulation(cascade):
+    """Behind an interruption, the impacts of a branch become fewer."""
+    grazings = cascade.of_kind("grazing")
+    (point,) = cascade.of_kind("interruption of chatter")
+    problem = grazings[0].problem
+    assert problem.accumulation(grazings) is not None
+    assert problem.accumulation([point, *grazings[:5]]) is None
+    assert problem.accumulation([*grazings[:4], point]) is None
+    assert problem.accumulation(grazings[::-1]) is None
+
+
+class Viscous(ImpactOscillator):
+    """The restitution is not defined for a motion away from the wall."""
+
+    def impact(self, t, state):
+        factor = 1.0 - 0.2 * jnp.power(state[1], 0.2)
+        return jnp.stack([state[0], -factor * state[1]])
+
+
 def once(system):
     return continuation.periodic_orbits(system)
 
@@ -108,7 +144,12 @@ def twice(system):
 
 @pytest.mark.parametrize(
     ("system", "represented"),
-    [(Walls(), once), (oscillator(-0.04), once), (oscillator(-0.04), twice)],
+    [
+        (Walls(), once),
+        (oscillator(-0.04), once),
+        (oscillator(-0.04), twice),
+        (Viscous(wall=-0.04, omega=OMEGA), once),
+    ],
 )
 def test_padding_does_not_change_an_orbit(system, represented, monkeypatch):
     """An orbit and its derivatives with 16 rows of unknowns, and with one for each

@@ -18,12 +18,15 @@ from .._parameter import leaf_of, with_leaf
 
 
 # number of successive grazing bifurcations
-_LEAST = 8
+_LEAST = 5
 # allowed change of the ratio of successive distances
 _STEADY = 0.02
 # allowed distance between the interruption and the limit of the bifurcations, relative
 # to the distance of the last one from it
 _AGREES = 0.5
+
+# distance from the interruption, relative to the parameter
+_INSIDE = 1e-13
 
 
 class Accumulation(NamedTuple):
@@ -40,17 +43,23 @@ class Accumulation(NamedTuple):
 def accumulation(problem: Any, points: Sequence[Any]) -> Accumulation | None:
     """Return where grazing bifurcations accumulate, or None if they do not.
 
-    `problem` is an `ImpactingOrbits`, and `points` are the bifurcations so far.
+    `problem` is an `ImpactingOrbits`, and `points` are the bifurcations so far. Chatter
+    theory needs two states and one constraint.
     """
     last = points[-_LEAST:]
-    if len(last) < _LEAST or problem.periods == 0:
+    planar = problem.dimension == 2 and set(problem.constraints) == {0}
+    if len(last) < _LEAST or problem.periods == 0 or not planar:
         return None
     orbits = [problem.with_signature(point.signature) for point in last]
+    if any(type(orbit) is not type(problem) for orbit in orbits):
+        return None
     impacts = np.array([len(orbit.constraints) for orbit in orbits])
     values = np.array([point.parameter for point in last])
     distances = np.diff(values)
+    if np.any(np.diff(impacts) != 1) or np.any(distances == 0):
+        return None
     ratios = distances[1:] / distances[:-1]
-    if np.any(np.diff(impacts) != 1) or not np.all((ratios > 0) & (ratios < 1)):
+    if not np.all((ratios > 0) & (ratios < 1)):
         return None
     if abs(ratios[-1] - ratios[-2]) > _STEADY:
         return None
@@ -68,6 +77,8 @@ def accumulation(problem: Any, points: Sequence[Any]) -> Accumulation | None:
     except ValueError:
         return None
     value = float(found)
+    # at the interruption itself, the sign of the margin is that of a rounding error
+    value += _INSIDE * max(abs(value), abs(rest)) * float(np.sign(rest))
     if abs(value - values[-1] - rest) > _AGREES * abs(rest):
         return None
     moved = with_leaf(system, leaf, jnp.asarray(value))

@@ -170,7 +170,7 @@ class ImpactingOrbits(AbstractOrbits):
         return Start(twice, state, float(point.parameter), np.append(tangent, 0.0))
 
     def eigenvalues(self, u, parameters, at):
-        return multipliers_of(self.equations, u, parameters, at)
+        return multipliers_of(self, u, parameters, at)
 
     @property
     def representation(self) -> "ImpactSequences":

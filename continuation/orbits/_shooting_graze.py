@@ -10,10 +10,10 @@ from variational.orbits import (
     links_of,
     multipliers_at_grazing,
     product_of_links,
-    Shooting,
 )
 
 from .._eigenvalues import eigenvalues_of
+from .._padding import as_compiled
 from ._watched import Watched
 
 
@@ -32,12 +32,12 @@ NONE = (
 
 
 def multipliers_of(
-    equations: Shooting, u: np.ndarray, parameters: Any, at: Any
+    problem: Any, u: np.ndarray, parameters: Any, at: Any
 ) -> tuple[Any, str]:
     """Return the multipliers (k,), largest modulus first, and a sentence if one is
     infinite or unknown.
     """
-    m = len(equations.constraints)
+    m = len(problem.constraints)
     speeds = np.array([float(at.monitors[Watched("speed", k).name]) for k in range(m)])
     least = _NO_SPEED * (1.0 + float(np.max(np.abs(u))))
     slow = np.flatnonzero(np.abs(speeds) <= least)
@@ -46,13 +46,14 @@ def multipliers_of(
     unknown = np.full(at.linearisation.shape[0], np.nan, complex)
     if slow.size > 1:
         return unknown, NONE.format(f"{slow.size} impacts have zero speed")
+    wide, v = as_compiled(problem, u)
     regular, singular = _parts(
-        equations, jnp.asarray(u), parameters, jnp.asarray(int(slow[0]))
+        wide.equations, jnp.asarray(v), parameters, jnp.asarray(int(slow[0]))
     )
     found = multipliers_at_grazing(np.asarray(regular), np.asarray(singular))
     if not np.all(np.isfinite(found[1:])):
         return unknown, NONE.format("the grazing is not simple")
-    if not equations.periods:
+    if not problem.periods:
         # without forcing, a time shift is a deviation that persists, with multiplier
         # one
         finite = np.flatnonzero(np.isfinite(found))

@@ -26,6 +26,10 @@ from ._test_functions import (
 _singular: Any = SingularPoints
 
 
+# a monitor that is not below this fraction of its values nearby jumps
+_JUMP = 1e-6
+
+
 class Located(NamedTuple):
     """A special point."""
 
@@ -81,9 +85,10 @@ def locate(
     points of the branch.
     """
     monitor = problem.monitors().get(name)
-    if monitor is not None and problem.costly and not monitor.bracket:
+    automatic = context.settings.localise != "newton"
+    if monitor is not None and problem.costly and not monitor.bracket and automatic:
         # compiling the extended system would take longer than some more points
-        z = _on_the_way(problem, name, context, a, b)
+        z = _on_the_way(problem, name, context, a, b, values)
         if z is not None:
             return Located(z, True, "")
     low, high = (a.z, values[0]), (b.z, values[1])
@@ -129,15 +134,22 @@ def locate(
 
 
 def _on_the_way(
-    problem: AbstractProblem, name: str, context: Context, a: Corrected, b: Corrected
+    problem: AbstractProblem,
+    name: str,
+    context: Context,
+    a: Corrected,
+    b: Corrected,
+    values: tuple[float, float],
 ) -> np.ndarray | None:
     """Return the zero of a monitor on the branch from a to b by Brent's method, or None
-    if a point between them could not be computed.
+    if a point between them could not be computed, or if the monitor jumps.
     """
     chord = (b.z - a.z) / a.scale
     points: list[np.ndarray] = []
 
     def value(share: float) -> float:
+        if share in (0.0, 1.0):
+            return values[int(share)]
         guess = cubic_between(a, b, share)
         at = correct(problem, context, guess, chord / a.scale, a.tangent)
         if not at.success or not _inside(at.z, a.z, b.z, a.scale):
@@ -147,10 +159,11 @@ def _on_the_way(
 
     try:
         found = root_scalar(value, bracket=(0.0, 1.0), method="brentq", xtol=1e-15)
-        value(found.root)
+        rest = value(found.root)
     except (ArithmeticError, ValueError, RuntimeError):
         return None
-    return points[-1]
+    jumps = abs(rest) > _JUMP * max(map(abs, values))
+    return None if jumps or not points else points[-1]
 
 
 def _between_branches(

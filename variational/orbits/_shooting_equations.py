@@ -57,10 +57,13 @@ class AbstractShooting(eqx.Module):
     """
 
     constraints: eqx.AbstractVar[Any]
+    """Constraint hit by each impact, in order."""
     periods: eqx.AbstractVar[Any]
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: eqx.AbstractVar[int]
+    """Number of states n."""
     steps: eqx.AbstractVar[int]
+    """Number of eighth-order Runge-Kutta steps in each flight."""
 
     @property
     @abc.abstractmethod
@@ -99,9 +102,11 @@ class AbstractShooting(eqx.Module):
 
     @property
     def following(self) -> Int[Array, " rows"]:
-        """Row of the next impact, for padding the row itself, shape `(rows,)`."""
-        k = jnp.arange(self.rows)
-        return jnp.where(self.real, jnp.where(k + 1 < self.number, k + 1, 0), k)
+        """Row of the next impact, for padding that after the first impact, shape
+        `(rows,)`.
+        """
+        k = jnp.where(self.real, jnp.arange(self.rows), 0)
+        return jnp.where(k + 1 < self.number, k + 1, 0)
 
     @property
     def last(self) -> Bool[Array, " rows"]:
@@ -151,7 +156,8 @@ class AbstractShooting(eqx.Module):
     def segments(self, u, system: HybridSystem):
         """Return the starts and ends of the flights: times (s) and states.
 
-        The flights of padding have no length and begin at the first impact.
+        The rows of padding repeat the first flight, so that all values are those of a
+        motion.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -163,9 +169,11 @@ class AbstractShooting(eqx.Module):
         starts = u.reshape(self.rows, 1 + self.dimension)
         if not self.forced:
             starts = starts.at[0, 0].set(0.0)
-        starts = jnp.where(self.real[:, None], starts, starts[0])
         ends = starts[self.following]
         ends = ends.at[:, 0].add(jnp.where(self.last, self.turns, 0.0))
+        starts, ends = (
+            jnp.where(self.real[:, None], rows, rows[0]) for rows in (starts, ends)
+        )
         unit = self.period(u, system) / self.turns
         scale = jnp.ones(1 + self.dimension).at[0].set(unit)
         return starts * scale[None, :], ends * scale[None, :]

@@ -1,0 +1,30 @@
+"""Detect where period-doubled orbits rejoin those of half the period."""
+
+from ._point import Point
+from ._solution import Solution
+from .special import BRANCH_POINT
+
+
+# an orbit has half the period if its halves differ by less than this, in step lengths;
+# their distance grows with a square root
+HALF = 1e-4
+JOINS = (
+    "the branch rejoins the orbits of half the period at their flip; beyond it, the "
+    "same orbits would be repeated, shifted by half a period"
+)
+
+
+def joins(current: Solution, point: Point) -> bool:
+    """Return whether orbits of half the period take over.
+
+    They form a separate branch, which is not followed a second time.
+    """
+    if point.kind != BRANCH_POINT:
+        return False
+    problem, parameters = current.problem, getattr(point.problem, "parameters")
+    half_away = problem.representation.half_away
+    before = half_away(current.at.z[:-1], parameters)
+    away = half_away(point.state, parameters)
+    if before is None or away is None:
+        return False
+    return away < min(HALF, 1e-2 * before)
