@@ -131,7 +131,8 @@ class Viscous(ImpactOscillator):
 
 
 def once(system):
-    return continuation.periodic_orbits(system)
+    guess = np.array([-0.6, 0.8]) if isinstance(system, Viscous) else None
+    return continuation.periodic_orbits(system, guess)
 
 
 def twice(system):
