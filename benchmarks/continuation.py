@@ -1,12 +1,17 @@
 """Measure the cost per point of a branch: jaxcam, singly and in a batch, and AUTO-07p.
 
     python -m benchmarks.continuation
+    JAX_COMPILATION_CACHE_DIR=$(mktemp -d) python -m benchmarks.continuation --cascade
+
+The second command times one branch from an empty cache of compiled programs: from one
+impact per period through grazing bifurcations to complete chatter.
 
 One pinned core, float64, minimum CPU time of interleaved runs after one for
 compilation. AUTO-07p (`auto`, Debian package auto-07p) is run for comparison if it is
 installed.
 """
 
+import argparse
 import os
 import shutil
 import subprocess
@@ -140,6 +145,18 @@ def orbits() -> None:
         print(f"  {row.name}: {1e3 / row.rate:.2f} ms a point ({count} points)")
 
 
+def cascade() -> None:
+    """Time a branch from one impact per period to complete chatter, once."""
+    begun = time.perf_counter()
+    system = ImpactOscillator(omega=2.0, wall=-0.04)
+    found = continuation.branch(system, None, wall, (-1.2, 0.0), direction=-1)
+    kinds = [point.kind for point in found.special]
+    print(
+        f"  {len(found.points)} points, {kinds.count('grazing')} grazings, {kinds[-2:]}"
+    )
+    print(f"  {time.perf_counter() - begun:.1f} s without imports")
+
+
 def batches(lanes: int = 100) -> None:
     """Time a hundred branches in one program, and one after the other."""
     values = np.linspace(-2.0, -0.5, lanes)
@@ -201,6 +218,11 @@ def auto() -> None:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--cascade", action="store_true", help="only that branch")
+    if parser.parse_args().cascade:
+        cascade()
+        return
     print(f"core {CORE}; one point after the other:")
     singles()
     print("periodic orbits with impacts:")

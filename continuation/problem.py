@@ -38,11 +38,10 @@ class AbstractProblem(eqx.Module):
     The other methods have defaults. **Traced** (called inside compiled programs; JAX
     functions, differentiable in forward mode): `residual`, `linearisation`,
     `derivatives`, `local_dynamics`, `seen`, `watched`, `scale`, `number_of_unknowns`.
-    All their non-array
-    data must be static, because one program is compiled for each problem structure and
-    reused for all array values in it. `residual` and monitors with `ends=False` must be
-    smooth, except for monitors with `corner`; where an orbit does not exist, return
-    NaN, and the step is halved.
+    All their non-array data must be static, because one program is compiled for each
+    problem structure and reused for all array values in it. `residual` and monitors
+    with `ends=False` must be smooth, except for monitors with `corner`; where an orbit
+    does not exist, return NaN, and the step is halved.
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,

@@ -122,6 +122,22 @@ def test_orbits_that_stick_are_no_part_of_an_accumulation(cascade):
     assert problem.accumulation(grazings[::-1]) is None
 
 
+def test_an_interruption_beyond_the_bounds_does_not_end_the_branch(cascade):
+    """The next grazing bifurcation adds an impact, as if nothing accumulated."""
+    eight = [p for p in cascade.points if p.signature.count("0.") == 7]
+    last = [p for p in eight if p.kind == "regular"][-1]
+    again = continuation.follow(
+        cascade.points[0].problem,
+        last,
+        "wall",
+        (-0.8, 0.0),
+        history=cascade.points[: last.label],
+    )
+    grazing, following = next(again), next(again)
+    assert grazing.kind == "grazing"
+    assert impacts(following) == 9
+
+
 class Viscous(ImpactOscillator):
     """The restitution is not defined for a motion away from the wall."""
 

@@ -124,7 +124,7 @@ class AbstractOrbits(AbstractProblem):
         return monitors, found
 
     def scale(self, u, parameters) -> Float[Array, " u"]:
-        """Return the scales of the unknowns, by default without padding.
+        """Return the scales of the unknowns; padding does not count.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

@@ -193,7 +193,7 @@ class ImpactingOrbits(AbstractOrbits):
 
     def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
-        if words[0] == STICKS:
+        if words[:1] == [STICKS]:
             sticking = orbits_of_kind(STICKS, self.parameters, self.periods)
             return sticking.with_signature(signature)
         if words[0::2] != ["impacts", "periods", "steps"]:
