@@ -65,4 +65,4 @@ def programs_are_given_back():
     yield
     mappings = Path("/proc/self/maps")
     if mappings.exists() and len(mappings.read_text().splitlines()) > _MAPPINGS:
-        jax.clear_caches()
+        jaxcam.clear_caches()

@@ -16,6 +16,7 @@ from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
 from jaxcam.fitting.engine import cost_by_recording, free_columns, Weights
 from jaxcam.fitting.engine._linearise import assemble_one, Costs
 from jaxcam.fitting.engine._predict import smallest_gap
+from jaxcam.fitting.engine._seen_directly import seen_directly
 from jaxcam.recordings import record, segment
 
 
@@ -86,6 +87,7 @@ def test_normal_equations_do_not_depend_on_how_they_are_compiled(rooms, found):
             jnp.asarray(columns.local),
             jnp.asarray(columns.scales),
             jnp.asarray(0),
+            False,
         )
         ours, theirs = (
             [np.asarray(leaf) for leaf in jax.tree.leaves(each(*args))]
@@ -94,6 +96,81 @@ def test_normal_equations_do_not_depend_on_how_they_are_compiled(rooms, found):
         for one, other in zip(ours, theirs):
             size = np.max(np.abs(other), initial=0.0)
             np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * size)
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    """A position with an error of its sensor, whose size is a parameter."""
+
+    def error(system, t, value, slope):
+        return 1e-2 * system.drag * jnp.sin(30.0 * value) + 1e-4 * slope**2
+
+    sensor = Sensor(0, noise=NOISE, gain=1.02, offset=3e-3, lag=2e-3, error=error)
+    lagging = Parameter("lag", lambda m: m.sensors["height_m"].lag, scale=1e-3)
+    calibrated = [
+        Parameter("gain", lambda m: m.sensors["height_m"].gain, scale=0.1),
+        Parameter("offset", lambda m: m.sensors["height_m"].offset, scale=0.01),
+        lagging,
+    ]
+    rng = np.random.default_rng(5)
+    run = record(TRUE, SENSORS, 2.0, rng=rng, state=[0.8, 0.3])
+    model = Model(TRUE, {"height_m": sensor})
+    parts = [segment(run, "height_m", 0.0)]
+    return Problem.build(model, parts, [*PARAMETERS, *calibrated])
+
+
+def test_only_the_error_of_a_sensor_is_seen_directly(shaken):
+    """The gravity acts by the motion; gain, offset and lag are part of the
+    calibration."""
+    seen = dict(zip(shaken.names, seen_directly(shaken.layout, shaken.pieces)))
+    assert [name for name, one in seen.items() if one] == ["drag"]
+
+
+def test_a_model_without_parameters_has_states_that_are_fitted():
+    """The cost is that of the noise."""
+    rng = np.random.default_rng(7)
+    parts = [
+        segment(record(TRUE, SENSORS, 2.0, rng=rng, state=[0.8, 0.3]), "height_m", 0.0)
+    ]
+    problem = Problem.build(Model(TRUE, SENSORS), parts, [])
+    found = fit(problem)
+    assert abs(found.cost - problem.samples) < 5 * np.sqrt(2 * problem.samples)
+
+
+def test_the_nodes_give_the_normal_equations_of_the_samples(shaken):
+    """To 1e-12 of the largest of each kind, in units of the standard errors, with all
+    parameters but that of the error free."""
+    columns = free_columns(shaken, [n for n in shaken.names if n != "drag"])
+    about = shaken.layout.about(shaken.start.values[0])
+    args = (
+        about,
+        shaken.pieces,
+        shaken.extras,
+        shaken.start.states,
+        jnp.asarray(columns.local),
+        jnp.asarray(columns.scales),
+        jnp.asarray(0),
+    )
+    (fast, costs), (slow, expected) = (
+        jax.tree.map(np.asarray, assemble_one(*args, direct))
+        for direct in (False, True)
+    )
+    for one, other in zip(jax.tree.leaves(costs), jax.tree.leaves(expected)):
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+    state = np.sqrt(np.diagonal(slow.ss, axis1=-2, axis2=-1))
+    value = np.sqrt(np.diagonal(slow.pp))
+    scales = {
+        "ss": state[:, :, None] * state[:, None],
+        "sp": state[:, :, None] * value,
+        "s": state,
+        "before": state[:, :, None] * np.roll(state, 1, axis=0)[:, None],
+        "pp": value[:, None] * value,
+        "p": value,
+    }
+    for name, scale in scales.items():
+        unit = np.where(scale > 0, scale, 1.0)
+        one, other = (getattr(blocks, name) / unit for blocks in (fast, slow))
+        assert np.max(np.abs(one - other)) <= 1e-12 * np.max(np.abs(other)), name
 
 
 def test_states_of_held_out_data_move_by_themselves(rooms, found, monkeypatch):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import jax
+from ..hybrid import clear_caches
 
 
 # Maximum number of mappings observed in one diagnosis
@@ -27,5 +27,5 @@ def make_room(used: Path = _USED, limit: Path = _LIMIT) -> bool:
         return False
     if now + _NEEDED < most:
         return False
-    jax.clear_caches()
+    clear_caches()
     return True

@@ -5,6 +5,7 @@ therefore predicts the gains of any number of forces, without compiling a progra
 each.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
@@ -27,6 +28,7 @@ from ...fitting.engine import (
     prior_information,
     program,
     runge_kutta,
+    shows_directly,
 )
 from ...parameters import FloatScalar
 from ..terms import Motion, system_with_terms, Term
@@ -101,15 +103,17 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     columns = free_columns(problem, free)
     stride = stride_of(problem)
     nodes = 2 * problem.pieces.steps // stride + 1
+    local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
     found = _linear(
         [problem.layout.about(values) for values in jnp.asarray(point.values)],
         problem.pieces,
         problem.weighted(None),
         point.states,
-        jnp.asarray(columns.local),
-        jnp.asarray(columns.scales),
+        local,
+        scales,
         nodes,
         stride,
+        shows_directly(problem.layout, problem.pieces, local, scales),
     )
     part = problem.pieces.flown
     half = stride * np.asarray(part.step)[..., None] / 2
@@ -228,11 +232,14 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
 
 @program
 def _linear(
-    near, pieces, extras, states, columns, scales, nodes, stride
+    near, pieces, extras, states, columns, scales, nodes, stride, shown
 ) -> LinearPieces:
     arrays, others = zip(*(eqx.partition(one, eqx.is_array) for one in near))
+    # one number for all recordings, so that its loops have one condition
+    substeps = jnp.max(pieces.substeps)
 
     def record(arrays, pieces, extras, states, columns, scales):
+        pieces = dataclasses.replace(pieces, substeps=substeps)
         size = columns.shape[0]
         near = eqx.combine(arrays, others[0]).by(columns, scales)
 
@@ -246,7 +253,8 @@ def _linear(
             )
             return eqx.tree_at(lambda m: m.system, model, system)
 
-        return linear_pieces(model_at, pieces, extras, states, size + nodes)
+        width = size + nodes
+        return linear_pieces(model_at, pieces, extras, states, width, shown)
 
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *arrays)
     return jax.vmap(record)(stacked, pieces, extras, states, columns, scales)

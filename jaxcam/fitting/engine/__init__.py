@@ -18,6 +18,7 @@ from ._eliminate import (
     state_steps as state_steps,
 )
 from ._known_constants import with_constants as with_constants
+from ._layout import Layout as Layout
 from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
 from ._linearise import (
     assemble as assemble,
@@ -26,7 +27,6 @@ from ._linearise import (
     cost_by_recording as cost_by_recording,
     cost_of as cost_of,
     Costs as Costs,
-    Layout as Layout,
     Point as Point,
     predict as predict,
     total_cost as total_cost,
@@ -49,6 +49,7 @@ from ._predict import runge_kutta as runge_kutta
 from ._problem import Problem as Problem, Weights as Weights
 from ._problem_checks import parameter_places as parameter_places
 from ._program import program as program
+from ._seen_directly import shows_directly as shows_directly
 from ._sharpness import loosened as loosened, separated as separated
 from ._starts import state_size as state_size
 from ._switched_steps import switched_nodes as switched_nodes

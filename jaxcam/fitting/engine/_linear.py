@@ -14,7 +14,8 @@ from jaxtyping import Array, Float
 from ._likelihood import score_all
 from ._model import Model
 from ._pieces import FLIGHT, IMPACT, Pieces
-from ._predict import flight_joint, fly, impact_joint, rest, samples
+from ._predict import calibration, flight_joint, fly, impact_joint, rest, samples
+from ._through_nodes import normal_through, shares_of
 
 
 class Sharpness(NamedTuple):
@@ -74,7 +75,12 @@ class LinearPieces(NamedTuple):
 
 
 def linear_pieces(
-    model_at: Callable[..., Model], pieces: Pieces, extras: Extras, states, width: int
+    model_at: Callable[..., Model],
+    pieces: Pieces,
+    extras: Extras,
+    states,
+    width: int,
+    shown: bool,
 ) -> LinearPieces:
     """Linearise one recording about its states.
 
@@ -86,29 +92,15 @@ def linear_pieces(
         extras: Further arguments of the compiled programs.
         states: States at the beginning of each piece.
         width: Number m of parameters.
+        shown: Whether a parameter may affect samples other than through the motion and
+            the calibration of the sensors.
 
     Returns:
         A [`jaxcam.fitting.engine.LinearPieces`][].
     """
-    size = states.shape[-1]
-    origin = jnp.zeros(width)
-
-    def piece(state, start, step, *inputs):
-        def predicted(state, change):
-            model = model_at(change, start, step)
-            return flown(model, state, start, step, *inputs, substeps=pieces.substeps)
-
-        (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
-        return end_rows, rows, end, seen
-
-    end_rows, rows, end, seen = jax.vmap(piece)(states, *flight_inputs(pieces))
-    part = pieces.flown
-    sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
-    found = score_all(sensors, part.value, seen)
-    weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
-    information, slope = _normal(rows, weight * found.information, weight * found.score)
-    flown_cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
-
+    size, origin = states.shape[-1], jnp.zeros(width)
+    found = _linear_flights(model_at, pieces, extras, states, origin, shown)
+    end, end_rows, flown_cost, information, slope = found
     pp, p, rested_cost = _linear_contacts(model_at, pieces, extras, origin)
 
     # rows for the earlier state, the later state and all other variables
@@ -149,6 +141,54 @@ def linear_pieces(
     )
 
 
+def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, shown):
+    """Linearise the pieces in flight.
+
+    **Returns:** their ends and the rows of these, their costs, and information and
+    score of their samples.
+    """
+    part = pieces.flown
+    sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
+
+    def piece(state, start, step, drive, place, value, weight):
+        def flight(state, change):
+            model = model_at(change, start, step)
+            end, nodes = fly(model, state, start, step, drive, pieces.substeps)
+            return end, (nodes, calibration(model))
+
+        def sampled(model, known):
+            along = _along(start, step, drive)
+            nodes, sensing = known
+            return samples(model, nodes, sensing, start, step, place, along)
+
+        def predicted(state, change):
+            end, known = flight(state, change)
+            return end, sampled(model_at(change, start, step), known)
+
+        if shown:
+            (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
+        else:
+            (end, known), (end_rows, rows) = _columns(flight, state, origin)
+            model = model_at(origin, start, step)
+            seen = sampled(model, known)
+        found = score_all(sensors, value, seen)
+        told = weight * found.information, weight * found.score
+        if shown:
+            normal = _normal(rows, *told)
+        else:
+            shares = shares_of(lambda known: sampled(model, known), known)
+            by_nodes, by_sensing = rows
+            normal = normal_through(by_nodes, by_sensing, shares, *told)
+        return end, end_rows, found.cost, *normal
+
+    weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
+    end, end_rows, costs, *normal = jax.vmap(piece)(
+        states, *flight_inputs(pieces), part.value, weight
+    )
+    cost = jnp.sum(jnp.where(part.known, costs, 0.0), axis=(1, 2, 3))
+    return end, end_rows, cost, *normal
+
+
 def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, origin):
     """Return information, score and cost of the pieces in contact, for the parameters
     alone.
@@ -172,19 +212,18 @@ def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, ori
     # if the surface cannot be found, the piece gives no information
     rows = jnp.where(part.known[..., None], rows, 0.0)
     score = weight * jnp.where(part.known, found.score, 0.0)
-    information, slope = _normal(rows, weight * found.information, score)
+    information, slope = jax.vmap(_normal)(rows, weight * found.information, score)
     pp, p = jnp.sum(information, axis=0), jnp.sum(slope, axis=0)
     cost = jnp.sum(jnp.where(part.known, found.cost, 0.0), axis=(1, 2, 3))
     return pp, p, cost
 
 
 def _normal(rows, information, score):
-    """Return the information and score of each piece, summed over its samples."""
+    """Return the information and score of a piece, summed over its samples."""
     # one matrix product a piece: a product of three arrays takes twice as long
-    rows = rows.reshape(len(rows), -1, rows.shape[-1])
-    information, score = (a.reshape(*rows.shape[:-1], 1) for a in (information, score))
-    turned = jnp.swapaxes(rows, -1, -2)
-    return turned @ (information * rows), (turned @ score)[..., 0]
+    rows = rows.reshape(-1, rows.shape[-1])
+    information, score = (a.reshape(-1, 1) for a in (information, score))
+    return rows.T @ (information * rows), (rows.T @ score)[:, 0]
 
 
 def _columns(function, *args):
@@ -204,18 +243,23 @@ def _columns(function, *args):
     return jax.vmap(pushed, out_axes=(None, -1))(*unit)
 
 
-def flown(model: Model, state, start, step, drive, place, *, substeps: int):
+def flown(model: Model, state, start, step, drive, place, *, substeps):
     end, nodes = fly(model, state, start, step, drive, substeps)
+    along = _along(start, step, drive)
+    return end, samples(model, nodes, calibration(model), start, step, place, along)
+
+
+def _along(start, step, drive):
+    """Return the middle of each step, and the drive there."""
     numbers = jnp.arange(drive.angle.shape[0], dtype=float)
-    along = start + (numbers + 0.5) * step, drive
-    return end, samples(model, nodes, start, step, place, along)
+    return start + (numbers + 0.5) * step, drive
 
 
 def rested(model: Model, guess, start, step, drive, place):
     nodes = rest(model, guess, start, step, drive)
     along = start + jnp.arange(drive.angle.shape[0], dtype=float) * step, drive
     along = jax.tree.map(lambda one: one[:-1], along)
-    return samples(model, nodes, start, step, place, along)
+    return samples(model, nodes, calibration(model), start, step, place, along)
 
 
 def rested_all(model: Model, pieces: Pieces, extras: Extras):

@@ -1,7 +1,6 @@
 """Score and information of every piece and joint about a point."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ._each_record import each_record
+from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
     Extras,
@@ -22,9 +22,9 @@ from ._linear import (
     rested_all,
     tied,
 )
-from ._model import Model
 from ._pieces import Pieces
 from ._program import program
+from ._seen_directly import shows_directly
 
 
 class Point(NamedTuple):
@@ -34,85 +34,6 @@ class Point(NamedTuple):
     """Values of the parameters of each recording, in their units, shape `(r, q)`."""
     states: Float[Array, "r k n"]
     """State at the beginning of each piece, shape `(r, k, n)`."""
-
-
-def _as_it_is(model: Model) -> Model:
-    return model
-
-
-class Layout(eqx.Module):
-    """The location of the parameters among the leaves of a model.
-
-    `ready` precomputes the quantities that a model needs at every step.
-    """
-
-    model: Model
-    """The model."""
-    places: tuple[int, ...] = eqx.field(static=True)
-    """Index of each parameter among the leaves."""
-    ready: Callable[[Model], Model] = eqx.field(static=True, default=_as_it_is)
-    """Prepares a model for many evaluations."""
-
-    def at(self, values: Float[Array, " q"]) -> Model:
-        """Return the model with the parameters at some values."""
-        leaves, tree = jax.tree.flatten(self.model)
-        for column, place in enumerate(self.places):
-            leaves[place] = values[column]
-        return self.ready(jax.tree.unflatten(tree, leaves))
-
-    @program
-    def about(self, values: Float[Array, " q"]) -> "Expansion":
-        """Return the model near some values."""
-        origin = self.at(values)
-        given = jax.tree.leaves(self.model)
-        leaves, tree = jax.tree.flatten(origin)
-        known = {id(leaf) for leaf in given}
-        moving = [k for k, leaf in enumerate(leaves) if id(leaf) not in known]
-
-        def pushed(unit):
-            def moved(values):
-                leaves = jax.tree.leaves(self.at(values))
-                return [leaves[k] for k in moving]
-
-            return jax.jvp(moved, (values,), (unit,))[1]
-
-        rows = jax.vmap(pushed)(jnp.eye(len(values)))
-        slopes: list[Any] = [None] * len(leaves)
-        for k, row in zip(moving, rows):
-            slopes[k] = row
-        return Expansion(origin, tuple(slopes))
-
-
-class Expansion(eqx.Module):
-    """A first-order expansion of a model in its parameters.
-
-    The quantities needed at every step are computed and differentiated once, instead of
-    in each piece.
-
-    - `slopes`: derivatives of each leaf, a row for each parameter; None if the leaf
-        depends on none.
-    """
-
-    model: Model
-    slopes: tuple[Float[Array, "..."] | None, ...]
-
-    def by(self, columns: Int[Array, " m"], scales: Float[Array, " m"]) -> "Expansion":
-        """Return the expansion in some of the parameters, in units of their scales."""
-
-        def rows(slope):
-            return slope[columns] * scales.reshape(-1, *[1] * (slope.ndim - 1))
-
-        slopes = tuple(None if s is None else rows(s) for s in self.slopes)
-        return Expansion(self.model, slopes)
-
-    def at(self, change: Float[Array, " m"]) -> Model:
-        """Return the model after a small change of the parameters."""
-        leaves, tree = jax.tree.flatten(self.model)
-        moved = [
-            leaf if slope is None else leaf + jnp.tensordot(change, slope, 1)
-            for leaf, slope in zip(leaves, self.slopes)
-        ]
-        return jax.tree.unflatten(tree, moved)
 
 
 class Blocks(NamedTuple):
@@ -171,16 +92,20 @@ def assemble(
         Normal equations and costs.
     """
 
+    shown = shows_directly(layout, pieces, columns, scales)
+
     def record(row):
         row = jnp.asarray(row)
         near = layout.about(jnp.asarray(point.values)[row])
-        return assemble_one(near, pieces, extras, point.states, columns, scales, row)
+        inputs = pieces, extras, point.states, columns, scales, row
+        return assemble_one(near, *inputs, shown)
 
-    return each_record(record, columns.shape[0])
+    args = layout, pieces, extras, point, columns, scales, shown
+    return each_record(record, columns.shape[0], (assemble_one, args))
 
 
 @program
-def assemble_one(near, pieces, extras, states, columns, scales, row):
+def assemble_one(near, pieces, extras, states, columns, scales, row, shown):
     """Apply `assemble` to one recording; its index is not part of the program."""
     one = pieces, extras, states, columns, scales
     pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
@@ -190,7 +115,8 @@ def assemble_one(near, pieces, extras, states, columns, scales, row):
         del start, step
         return near.at(change)
 
-    found = linear_pieces(model_at, pieces, extras, states, columns.shape[0])
+    width = columns.shape[0]
+    found = linear_pieces(model_at, pieces, extras, states, width, shown)
     costs = Costs(found.flown_cost, found.joint_cost, found.rested_cost)
     return chained(found), costs
 
@@ -202,9 +128,12 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 
 def _predicted(layout, pieces, extras, point):
+    # one number for all recordings, so that its loops have one condition
+    substeps = jnp.max(pieces.substeps)
+
     def record(pieces, extras, values, states):
         model = layout.at(values)
-        end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=pieces.substeps))(
+        end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(
             states, *flight_inputs(pieces)
         )
         resting = rested_all(model, pieces, extras)

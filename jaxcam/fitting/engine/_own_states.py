@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._layout import Layout
 from ._linear import Extras, flight_inputs, flown
-from ._linearise import Layout, Point
+from ._linearise import Point
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
 from ._predict import after_impact
@@ -134,14 +135,13 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
     """Return the state of each piece at its end, and the state after an impact
     there.
     """
+    substeps = jnp.max(pieces.substeps)
 
     def one(values, states, pieces):
         model = layout.at(values)
         size = states.shape[-1] - len(filtered_channels(model))
         inputs = states, *flight_inputs(pieces)
-        ends, _ = jax.vmap(lambda *a: flown(model, *a, substeps=pieces.substeps))(
-            *inputs
-        )
+        ends, _ = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(*inputs)
         part = pieces.flown
         times = part.start + part.step * part.place.shape[-2]
 

@@ -62,7 +62,8 @@ class Pieces(eqx.Module):
         contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
     - `drive_error`: standard errors of each recording's drive.
-    - `substeps`: number of parts into which a prediction divides each step.
+    - `substeps` `(r,)`: number of parts into which a prediction divides each step, the
+        same for all recordings.
     """
 
     flown: Samples
@@ -75,7 +76,7 @@ class Pieces(eqx.Module):
     rest_drive: DriveState
     reach: Float[Numbers, " r"]
     drive_error: DriveError
-    substeps: int = eqx.field(static=True, default=1)
+    substeps: Int[Numbers, " r"]
 
     @property
     def steps(self) -> int:
@@ -241,6 +242,7 @@ def gather(
         rest,
         np.array([_REACH * part.recording.interval for part in segments]),
         drive_error(segments, _PIECE),
+        np.ones(records, dtype=int),
     )
     return pieces, cuts
 

@@ -1,6 +1,6 @@
 """Predict one piece: its samples, its end and its joint."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,11 +31,11 @@ class Nodes(NamedTuple):
     right_rate: Float[Array, "n c"]
 
 
-def fly(model: Model, state, start, step, drive: DriveState, substeps: int = 1):
+def fly(model: Model, state, start, step, drive: DriveState, substeps: Any = 1):
     """Integrate one piece of flight by the classical Runge-Kutta method.
 
-    With `substeps`, each step is divided for the values, but not for the derivatives,
-    which need far fewer digits and cost far more.
+    With `substeps`, a number or an integer array, each step is divided for the values,
+    but not for the derivatives, which need far fewer digits and cost far more.
 
     **Returns:** the state at its end `(n,)`, and its `Nodes`.
     """
@@ -43,7 +43,7 @@ def fly(model: Model, state, start, step, drive: DriveState, substeps: int = 1):
         states, fields, _ = switched_nodes(model, state, start, step, drive, substeps)
     else:
         states, fields = _nodes(model, state, start, step, drive, 1)
-        if substeps > 1:
+        if not _is_one(substeps):
             still, begin = constant((model, state))
             fine = _nodes(still, begin, start, step, drive, substeps)
             states, fields = (
@@ -63,6 +63,10 @@ def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps)
     return _nodes(model, state, start, step, drive, substeps)[0][-1]
 
 
+def _is_one(substeps) -> bool:
+    return isinstance(substeps, int) and substeps == 1
+
+
 def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
     """Return the states at the ends of all steps `(n + 1, s)`, and their rates."""
     part = step / jnp.asarray(substeps, dtype=float)
@@ -71,7 +75,7 @@ def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
         number, here = inputs
         t0 = start + number * step
         system_at = model.during(t0 + step / 2, here)
-        if isinstance(substeps, int) and substeps == 1:
+        if _is_one(substeps):
             x1, k1 = runge_kutta(model, system_at, t0, x, step)
             return x1, (x, k1)
 
@@ -179,11 +183,28 @@ def _least(slopes, residual):
     return slopes.T @ push
 
 
-def samples(model: Model, nodes: Nodes, start, step, place, along):
+class Calibration(NamedTuple):
+    """Offset, gain and lag of each sensor, `(c,)` each."""
+
+    offset: Float[Array, " c"]
+    gain: Float[Array, " c"]
+    lag: Float[Array, " c"]
+
+
+def calibration(model: Model) -> Calibration:
+    """Return the calibration of a model's sensors."""
+    sensors = model.sensors.values()
+    parts = ([getattr(s, name) for s in sensors] for name in Calibration._fields)
+    return Calibration(*map(jnp.stack, parts))
+
+
+def samples(
+    model: Model, nodes: Nodes, sensing: Calibration, start, step, place, along
+):
     """Sample every channel, shape `(n, m, c)`, by cubic Hermite polynomials.
 
-    **Arguments:** the position `along` each step at which the drive is given, and the
-    drive there.
+    **Arguments:** the calibration of the sensors; the position `along` each step at
+    which the drive is given, and the drive there.
     """
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]
@@ -195,16 +216,14 @@ def samples(model: Model, nodes: Nodes, start, step, place, along):
     value = left + u * (a + u * (second + u * third))
     slope = a + u * (2 * second + 3 * u * third)
     bend = 2 * second + 6 * u * third
-    sensors = model.sensors.values()
-    lag = jnp.stack([s.lag for s in sensors]) / step
-    gain = jnp.stack([s.gain for s in sensors])
-    offset = jnp.stack([s.offset for s in sensors])
+    lag = sensing.lag / step
 
     def sensed(value, slope, bend):
-        return offset + gain * (value - lag * slope + lag**2 / 2 * bend)
+        seen = value - lag * slope + lag**2 / 2 * bend
+        return sensing.offset + sensing.gain * seen
 
     shown = jax.vmap(jax.vmap(sensed))(value, slope, bend)
-    if all(sensor.error is None for sensor in sensors):
+    if all(sensor.error is None for sensor in model.sensors.values()):
         return shown
     return shown + _errors(model, start, step, place, along, value, slope)
 

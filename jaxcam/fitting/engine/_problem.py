@@ -57,8 +57,9 @@ from jaxtyping import Float
 
 from ...recordings import RecordingError, Segments
 from ._known_constants import known_constants
+from ._layout import Layout
 from ._linear import Extras
-from ._linearise import Layout, Point
+from ._linearise import Point
 from ._model import Input, Model
 from ._own_states import own_states
 from ._parameter import Parameter

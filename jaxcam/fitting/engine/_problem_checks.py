@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid import SwitchedSystem
-from ._linearise import Layout, Point
+from ._layout import Layout
+from ._linearise import Point
 from ._model import augmented_field, Model
 from ._pieces import Pieces
 from ._program import program

@@ -5,8 +5,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._layout import Layout
 from ._linear import Extras, Sharpness
-from ._linearise import assemble, Layout, Point
+from ._linearise import assemble, Point
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
 from ._predict import after_impact, fly, smallest_gap
@@ -86,8 +87,9 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Return normal equations of the states, with all parameters held, and the
     costs.
     """
-    # as wide as a fit of all parameters, whose program is then already compiled; for
-    # many steps, a separate program soon repays its compilation time
+    # as wide as a fit of all parameters, whose program is then already compiled unless
+    # a sensor shows one of them directly; for many steps, a separate program soon
+    # repays its compilation time
     few = pieces.steps <= _FEW_STEPS
     width = width_of(len(layout.places)) if few else _WIDTH
     none = jnp.zeros((pieces.joint.shape[0], width), dtype=int)

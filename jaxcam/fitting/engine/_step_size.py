@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._layout import Layout
 from ._linear import Extras
-from ._linearise import Layout, Point
+from ._linearise import Point
 from ._model import DriveState, Input, Model
 from ._pieces import Pieces
 from ._predict import end_of_flight, fly
@@ -72,15 +73,16 @@ def enough_substeps(
     part_of_error = _STEP_ERROR / max(1.0, flight / _LONG) ** 1.5
     scale = np.asarray(extras.sharpness.piece)
     inside = np.asarray(pieces.exists)[..., None]
-    substeps, once = pieces.substeps, dataclasses.replace(pieces, substeps=1)
-    coarse = _ends(layout, once, point, jnp.asarray(substeps))
+    substeps = int(np.max(pieces.substeps))
+    coarse = _ends(layout, pieces, point, jnp.asarray(substeps))
     while substeps < _MOST_SUBSTEPS:
-        fine = _ends(layout, once, point, jnp.asarray(2 * substeps))
+        fine = _ends(layout, pieces, point, jnp.asarray(2 * substeps))
         change = np.abs(coarse - fine) / scale
         if np.max(np.where(inside, change, 0.0)) < part_of_error:
             break
         substeps, coarse = 2 * substeps, fine
-    return dataclasses.replace(pieces, substeps=substeps)
+    filled = np.full_like(np.asarray(pieces.substeps), substeps)
+    return dataclasses.replace(pieces, substeps=filled)
 
 
 @program

@@ -58,7 +58,7 @@ class Located(NamedTuple):
     """The parts of a piece between its events, and its end."""
 
     parts: Part
-    """The parts, also those between substeps."""
+    """The parts; those that are not needed have no length."""
     end: Float[Array, " s"]
     """State at the end, shape `(s,)`."""
     mode: Mode
@@ -104,7 +104,7 @@ def switched_nodes(
     start,
     step,
     drive: DriveState,
-    substeps: int,
+    substeps,
     mode: Mode | None = None,
     events: int = _EVENTS,
 ):
@@ -117,11 +117,10 @@ def switched_nodes(
     steps, mode = _steps(model, state, start, step, drive, mode, events)
     fixed, begin, first = constant((steps, state, mode))
     found = _located(fixed, begin, first, substeps)
-    states, rates, end = _integrated(steps, state, _merged(found.parts, steps))
+    states, rates, end = _integrated(steps, state, found.parts)
     states = jnp.concatenate([states, end[None]])
-    if substeps > 1:
-        fine = jnp.concatenate([_at_steps(found.parts, steps).state, found.end[None]])
-        states = states + jax.lax.stop_gradient(fine - states)
+    fine = jnp.concatenate([_at_steps(found.parts, steps).state, found.end[None]])
+    states = states + jax.lax.stop_gradient(fine - states)
     last = steps.field(steps.count - 1, found.mode)
     final = last(start + steps.count * step, states[-1])
     return states, jnp.concatenate([rates, final[None]]), found.mode
@@ -135,7 +134,7 @@ def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
     advance = _advancing(steps, substeps)
     found = jax.lax.while_loop(
         lambda one: one.place < steps.count * substeps,
-        lambda one: advance(one, None)[0],
+        lambda one: advance(one)[0],
         _begun(steps, state, mode),
     )
     return found.state
@@ -152,12 +151,43 @@ def _steps(model: Model, state, start, step, drive: DriveState, mode, events):
     return _Steps(model, start, step, drive, known, size, events), mode
 
 
-def _located(steps: _Steps, state, mode: Mode, substeps: int) -> Located:
-    """Locate the events of a piece; its parts end there and at the ends of substeps."""
-    advance = _advancing(steps, substeps)
-    first, count = _begun(steps, state, mode), steps.count * substeps
-    last, parts = jax.lax.scan(advance, first, length=count + steps.events)
-    return Located(parts, last.state, last.mode)
+def _located(steps: _Steps, state, mode: Mode, substeps) -> Located:
+    """Locate the events of a piece; its parts end there and at the ends of steps."""
+    advance, count = _advancing(steps, substeps), steps.count * substeps
+    nothing = Part(
+        jnp.asarray(steps.count),
+        jnp.zeros_like(steps.step),
+        jnp.zeros_like(steps.step),
+        state,
+        mode,
+        jnp.zeros((steps.surfaces.number,), dtype=bool),
+        mode,
+    )
+    room = steps.count + steps.events
+    empty = jax.tree.map(lambda one: jnp.broadcast_to(one, (room, *one.shape)), nothing)
+
+    def further(carried):
+        place, begun, whole, number, parts = carried
+        after, part = advance(place)
+        first = jax.tree.map(lambda a, b: jnp.where(begun, a, b), whole, part)
+        whole = first._replace(
+            length=part.length + jnp.where(begun, whole.length, 0.0),
+            ends=part.ends,
+            after=part.after,
+        )
+        parts = jax.tree.map(lambda a, b: a.at[number].set(b), parts, whole)
+        ended = jnp.any(part.ends) | (after.place % substeps == 0)
+        return after, ~ended, whole, number + ended.astype(int), parts
+
+    last, *_, used, parts = jax.lax.while_loop(
+        lambda carried: carried[0].place < count,
+        further,
+        (_begun(steps, state, mode), False, nothing, jnp.asarray(0), empty),
+    )
+    # the others are empty parts after the last step
+    other = jnp.arange(room)[:, None] >= used
+    final = Mode(*(jnp.where(other, a, b) for a, b in zip(last.mode, parts.mode)))
+    return Located(parts._replace(mode=final), last.state, last.mode)
 
 
 class _Place(NamedTuple):
@@ -182,23 +212,21 @@ def _advancing(steps: _Steps, substeps):
     short = steps.step / jnp.asarray(substeps, dtype=float)
     count = steps.count * substeps
 
-    def advance(carried: _Place, _):
+    def advance(carried: _Place):
         place, passed, x, mode, events = carried
-        idle = place >= count
+        # a piece that is finished waits for the others
         inside = jnp.minimum(place, count - 1)
         number = inside // substeps
         within = jnp.asarray(inside - number * substeps, dtype=float)
         offset = within * short + passed
-        left = jnp.where(idle, 0.0, short - passed)
+        left = short - passed
         t = steps.begin(number) + offset
-        wanted = (events < steps.events) & ~idle
+        wanted = events < steps.events
         found = _first_event(steps, number, t, x, mode, left, wanted)
         part = Part(number, offset, found.length, x, mode, found.ends, found.mode)
-        part = part._replace(number=jnp.where(idle, steps.count, number))
         event = jnp.any(found.ends)
-        done = ~event & ~idle
-        passed = jnp.where(done, 0.0, passed + found.length)
-        place, events = place + done.astype(int), events + event.astype(int)
+        passed = jnp.where(event, passed + found.length, 0.0)
+        place, events = place + (~event).astype(int), events + event.astype(int)
         return _Place(place, passed, found.state, found.mode, events), part
 
     return advance
@@ -278,26 +306,6 @@ def _at_steps(parts: Part, steps: _Steps) -> Part:
     """Return the part with which each step begins."""
     first = jnp.searchsorted(parts.number, jnp.arange(steps.count))
     return jax.tree.map(lambda one: one[first], parts)
-
-
-def _merged(parts: Part, steps: _Steps) -> Part:
-    """Join the parts of each step that no event separates."""
-    count, number = steps.count + steps.events, parts.number
-    new = jnp.concatenate([jnp.ones(1, dtype=bool), number[1:] != number[:-1]])
-    event = jnp.any(parts.ends, axis=-1)
-    new = new | jnp.concatenate([jnp.zeros(1, dtype=bool), event[:-1]])
-    (begin,) = jnp.nonzero(new & (number < steps.count), size=count, fill_value=-1)
-    total = len(number)
-    begin = jnp.where(begin < 0, total, begin)
-    last = jnp.append(begin[1:], total) - 1
-    passed = jnp.append(0.0, jnp.cumsum(parts.length))
-    first, final = (
-        jax.tree.map(lambda one, at=at: one[at], parts)
-        for at in (jnp.minimum(begin, total - 1), last)
-    )
-    return first._replace(
-        length=passed[last + 1] - passed[begin], ends=final.ends, after=final.after
-    )
 
 
 def _integrated(steps: _Steps, state, parts: Part):

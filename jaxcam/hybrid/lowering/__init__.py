@@ -4,7 +4,11 @@ The only exception is `whole`, which adds missing transformations to a loop.
 """
 
 from ._elements import split as split
-from ._jaxprs import opened as opened, saving_jvp as saving_jvp
+from ._jaxprs import (
+    opened as opened,
+    saving_jvp as saving_jvp,
+    used_inputs as used_inputs,
+)
 from ._known import (
     computed as computed,
     is_known as is_known,

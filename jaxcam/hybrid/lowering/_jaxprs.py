@@ -67,6 +67,12 @@ def without_unused(closed: ClosedJaxpr, used: list[bool] | None = None) -> Close
     return ClosedJaxpr(less, closed.consts)
 
 
+def used_inputs(closed: ClosedJaxpr) -> list[bool]:
+    """Return which inputs of a program its results depend on."""
+    every = [True] * len(closed.jaxpr.outvars)
+    return list(partial_eval.dce_jaxpr(closed.jaxpr, every)[1])
+
+
 def saving_jvp(function: Callable) -> jax.custom_jvp:
     """Apply `jax.custom_jvp` with a derivative that is equal to that of the function
     but cheaper. A function with a different rule must be called unchanged, but this one
