@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from ...fitting import Fit, fit
 from ..policy import Policy
-from ..search import Blocks, blocks_of, gain, newton_step
+from ..search import Blocks, blocks_of, gain, given_up, newton_step
 from ._held_out import rms_of
 
 
@@ -78,18 +78,24 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
     halves = blocks_of(problem, found.point, 2, found.free)
     gains = {name: _gain(halves, name) for name in shared}
     promising = sorted(shared, key=lambda name: -gains[name])[: policy.followed]
-    tried = [
-        _separated(found, name, policy)
-        for name in promising
-        if gains[name] > least and _foretold(halves, name) > 0
-    ]
-    best = max(tried, key=lambda one: one.share, default=None)
-    return best if best is not None and best.share >= policy.differs else None
+    best, share = None, policy.differs
+    for name in promising:
+        if gains[name] > least and _foretold(halves, name) > 0:
+            one = _separated(found, name, policy, share)
+            if one.share >= share:
+                best, share = one, one.share
+    return best
 
 
-def _separated(found: Fit, name: str, policy: Policy) -> Differing:
-    """Fit a parameter with a separate value for each recording."""
+def _separated(found: Fit, name: str, policy: Policy, least: float) -> Differing:
+    """Fit a parameter with a separate value for each recording.
+
+    **Arguments:** `least`: the share of the residual that they must explain; a fit that
+    is late in reaching it is stopped.
+    """
     problem = found.problem
+    excess = found.cost - problem.samples
+    beaten = found.cost - least * excess
     parameters = tuple(
         dataclasses.replace(one, per_record=True) if one.name == name else one
         for one in problem.parameters
@@ -99,9 +105,9 @@ def _separated(found: Fit, name: str, policy: Policy) -> Differing:
         free=found.free,
         start=found.point,
         iterations=policy.iterations,
+        stop=given_up(problem.samples, policy, beaten, beaten),
     )
     own = [one for one in again.estimates if one.name == name]
-    excess = found.cost - problem.samples
     return Differing(
         name,
         problem.parameter(name).unit,
