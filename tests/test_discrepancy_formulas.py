@@ -1,7 +1,9 @@
 """Forms of free functions: what is written is what was fitted."""
 
+import dataclasses
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -96,6 +98,80 @@ def test_a_form_continues_beyond_the_range_as_its_formula_does():
     curve = FREE[Where.FLIGHT].of(family, "a", coefficients).prepared()
     end = float(curve.at(jnp.array([HIGH]))[0])
     assert abs(float(curve.at(at)[0]) - end) < 1e-12
+
+
+@pytest.mark.parametrize("steps", [20, 60])
+def test_the_derivative_by_an_edge_is_seen_by_steps_longer_than_the_edge(steps):
+    """Simpson's rule, as in a Runge-Kutta step, gives the change of the impulse of a
+    jump that moves within a step: that of the jump, to 4 %."""
+    stride = HIGH / steps
+    family = dataclasses.replace(_family(Variable.TIME), stride=stride)
+    step = next(one for one in family.primitives if one.name == "step")
+    at = jnp.linspace(family.low, family.high, 2 * steps + 1)
+    weights = np.tile([1.0, 4.0, 1.0, 0.0], steps).reshape(steps, 4)[:, :3] * stride / 6
+
+    def values(place):
+        numbers = [1.5, place, *[0.0] * 19]
+        return FREE[Where.FLIGHT].of(family, "a", numbers, step).prepared().at(at)
+
+    places = 0.4 + np.arange(8) / 8 / steps
+    slopes = np.asarray(jax.vmap(jax.jacfwd(values))(jnp.asarray(places)))
+    impulses = sum(slopes[:, k::2][:, :steps] @ weights[:, k] for k in (0, 1, 2))
+    assert impulses == pytest.approx(-1.5 * HIGH, rel=0.04)
+    # the values are not softened: 3 % of the range from the edge they are those of it
+    found = np.asarray(values(jnp.asarray(0.4)))
+    far = np.abs(np.asarray(at) / HIGH - 0.4) > 0.03
+    exact = np.where(at > 0.4 * HIGH, 1.5, 0.0)
+    assert found[far] == pytest.approx(exact[far], abs=1e-2)
+
+
+def _slope(function, at, h=1e-6):
+    """Its derivative, and the central difference of its values."""
+    slope = float(jax.grad(function)(jnp.asarray(at)))
+    difference = float(function(jnp.asarray(at + h)) - function(jnp.asarray(at - h)))
+    return slope, difference / (2 * h)
+
+
+def _form(name, stride, argument=Variable.TIME):
+    family = dataclasses.replace(_family(argument), stride=stride)
+    form = next(one for one in family.primitives if one.name == name)
+    numbers = [*NUMBERS[name], *[0.0] * (21 - form.count)]
+    return FREE[Where.FLIGHT].of(family, "a", numbers, form)
+
+
+def test_outside_a_fit_the_derivatives_are_those_of_the_values():
+    """To 1e-6 of a central difference, beside an edge; also if it was prepared."""
+    soft, at = _form("step", HIGH / 20), 0.4 * HIGH + 3e-3
+    slope, expected = _slope(soft.prepared().at, at)
+    assert abs(slope - expected) > 0.1 * abs(expected)
+    for one in (soft.exact().prepared(), soft.prepared().exact()):
+        slope, expected = _slope(one.at, at)
+        assert slope == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["wave", "bump", "above"])
+def test_a_form_without_jumps_has_the_derivatives_of_its_values(name):
+    """To 1e-6 of a central difference."""
+    form = _form(name, HIGH / 10).prepared()
+    for at in (0.41, 0.52, 0.83):
+        slope, expected = _slope(form.at, at)
+        assert slope == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_the_edges_of_a_narrow_window_are_not_averaged_together():
+    """The derivative by its height keeps four fifths of its area within the window."""
+    family = dataclasses.replace(_family(Variable.TIME), stride=HIGH / 5)
+    window = next(one for one in family.primitives if one.name == "window")
+    at = jnp.linspace(family.low, family.high, 1000)
+
+    def values(size):
+        numbers = [size, 0.4, 0.5, *[0.0] * 18]
+        return FREE[Where.FLIGHT].of(family, "a", numbers, window).prepared().at(at)
+
+    slopes = np.asarray(jax.jacfwd(values)(jnp.asarray(1.0)))
+    inside = (np.asarray(at) > 0.35 * HIGH) & (np.asarray(at) < 0.55 * HIGH)
+    assert np.sum(slopes[inside]) > 0.8 * np.sum(slopes)
+    assert np.sum(slopes) / 1000 == pytest.approx(0.1, rel=0.02)
 
 
 def test_every_form_has_as_many_numbers_as_it_says():

@@ -193,14 +193,14 @@ def test_what_free_parameters_imitate_is_no_function():
 def test_families_have_one_place_each_and_different_names():
     both = families(
         (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
-        turned=True, impacting=True, slip=0.01, motion_unit="m",
+        turned=True, impacting=True, slip=0.01, motion_unit="m", strides={},
     )  # fmt: skip
     names = [one.name for one in both]
     assert len(set(names)) == len(names)
     assert {one.where for one in both} == set(Where) - {Where.DRIVE}
     free = families(
         (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
-        turned=False, impacting=False, slip=0.01, motion_unit="m",
+        turned=False, impacting=False, slip=0.01, motion_unit="m", strides={},
     )  # fmt: skip
     assert {one.where for one in free} == {Where.FLIGHT, Where.SENSOR}
     assert all(one.argument is not Variable.PHASE for one in free)

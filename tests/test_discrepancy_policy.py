@@ -78,6 +78,10 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_KNOTS",
         "_MARGIN",
         "_SINES",
+        # how a function is written into a table
+        "_FINER",
+        # substeps in which a force with edges is integrated
+        "_SUBSTEPS",
         # how the corner of dry friction is written down
         "_HELD",
         "_FADE",

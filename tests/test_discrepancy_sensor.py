@@ -23,7 +23,7 @@ from jaxcam.discrepancy.terms import (
 )
 from jaxcam.fitting import Model, Parameter, read_setup, Sensor
 from jaxcam.fitting.engine import DriveState
-from jaxcam.fitting.engine._predict import fly, samples
+from jaxcam.fitting.engine._predict import calibration, fly, samples
 from jaxcam.models import ImpactOscillator
 
 
@@ -54,7 +54,7 @@ def _seen(model: Model):
     drive = DriveState(jnp.zeros(steps), jnp.zeros(steps), jnp.zeros(steps))
     _, nodes = fly(model, jnp.array([-1.0, 0.3]), start, step, drive)
     along = start + (jnp.arange(steps, dtype=float) + 0.5) * step, drive
-    found = samples(model, nodes, start, step, place, along)
+    found = samples(model, nodes, calibration(model), start, step, place, along)
     time = start + step * (jnp.arange(steps, dtype=float)[:, None] + place)
     return np.asarray(found).reshape(-1, 2), np.asarray(time).ravel()
 

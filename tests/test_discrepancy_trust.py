@@ -114,7 +114,7 @@ def test_noise_is_told_from_a_motion_with_few_samples_per_period():
 def test_places_are_shown_where_data_are():
     """Positions on two islands: what is between them has no data."""
     islands = np.concatenate([np.linspace(0, 1, 500), np.linspace(3, 4, 500)])
-    seen = VisitedStates(islands, islands, np.zeros(0), 4.0)
+    seen = VisitedStates(islands, islands, np.zeros(0), 4.0, {})
     grid = np.linspace(0, 4, 41)
     near = seen.near("position", grid, Policy())
     assert near[(grid < 1) | (grid > 3)].all()

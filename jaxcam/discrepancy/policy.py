@@ -79,6 +79,11 @@ class Policy:
         "maximum relative error of the functional form of a named term; its square is "
         "the fraction of the explained cost that may remain",
     )
+    form_loss: float = _decides(
+        10.0,
+        "difference in BIC, divided by the cost per sample, up to which a worse "
+        "formula replaces a curve",
+    )
     corner_share: float = _decides(
         3e-4,
         "fraction of the explained cost that the smoothing of dry friction at zero "
@@ -171,7 +176,9 @@ class Policy:
     kept: int = _bounds(3, "number of subsets of each size that are extended")
     tried: int = _bounds(6, "number of subsets fitted at each size above one")
     leads: float = _bounds(
-        50.0, "difference in BIC up to which a subset is extended further"
+        50.0,
+        "difference in BIC up to which a subset is extended further, and in predicted "
+        "gain up to which a further form is tried",
     )
     helped: float = _bounds(
         0.7, "maximum fraction of the cost left by a term for the search to go on"
@@ -224,7 +231,7 @@ class Policy:
         0.9, "the same minimum if another function already explains the data"
     )
     followed: int = _bounds(
-        3, "maximum number of free functions and terms fitted per stage"
+        3, "maximum number of free functions, terms and forms fitted per stage"
     )
     outdone: float = _bounds(1.25, "multiple of the curve's cost that a form must beat")
     enough: float = _bounds(

@@ -212,7 +212,8 @@ def _without_a_name(
     if best.names and max(one.gain for one in left) < small:
         return None, None, ()
     problem = question.problem
-    positions, velocities, approach, duration = visited_states(problem).ranges(policy)
+    visited = visited_states(problem)
+    positions, velocities, approach, duration = visited.ranges(policy)
     offered = families(
         positions,
         velocities,
@@ -222,6 +223,7 @@ def _without_a_name(
         impacting=any(len(part.impacts.approach) for part in problem.segments),
         slip=question.references.slip_speed,
         motion_unit=question.unit,
+        strides=visited.strides,
     )
 
     def searched(elements: bool, policy: Policy = policy):

@@ -1,11 +1,14 @@
-"""Ranges of the recorded motion, to which free functions are restricted."""
+"""Ranges and rates of the recorded motion, to which free functions are adapted."""
 
+import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from ...fitting import Problem
+from ...recordings.cut import usual_acceleration
 from ..policy import Policy
 from ..terms import Variable
 
@@ -18,12 +21,14 @@ class VisitedStates(NamedTuple):
     """Values of each variable in the recordings, and their duration (s).
 
     Positions are those of the state: offset and gain of the sensor are removed.
+    `strides` are the changes of each variable in an integration step where it is fast.
     """
 
     position: Float[np.ndarray, " _"]
     velocity: Float[np.ndarray, " _"]
     approach: Float[np.ndarray, " _"]
     duration: float
+    strides: Mapping[Variable, float]
 
     def ranges(self, policy: Policy):
         """Return the ends of position, velocity and approach speed, and the
@@ -65,19 +70,44 @@ class VisitedStates(NamedTuple):
 
 def visited_states(problem: Problem) -> VisitedStates:
     """Return the states visited by the recordings of a problem."""
-    states = np.asarray(problem.start.states)[np.asarray(problem.pieces.exists)]
+    exists = np.asarray(problem.pieces.exists)
+    states = np.asarray(problem.start.states)[exists]
     place, rate = problem.model.system.coordinates[0]  # pyright: ignore
     sensors = problem.model.sensors
     channels = [name for name, s in sensors.items() if s.observe == place]
-    position = states[:, place]
+    position, push = states[:, place], 0.0
     if channels:
         sensor = sensors[channels[0]]
         seen = np.concatenate([p.recording[channels[0]] for p in problem.segments])
         position = (seen - float(sensor.offset)) / float(sensor.gain)
+        runs = [part.recording for part in problem.segments]
+        push = usual_acceleration(runs, channels[0]) / abs(float(sensor.gain))
     speeds = np.concatenate([part.impacts.approach for part in problem.segments])
     return VisitedStates(
         position[np.isfinite(position)],
         states[:, rate],
         speeds[np.isfinite(speeds) & (speeds > 0)],
         max(part.recording.duration for part in problem.segments),
+        _strides(problem, exists, states[:, rate], push),
     )
+
+
+def _strides(problem: Problem, exists, velocity, push: float):
+    """Return the changes of each variable in an integration step.
+
+    **Arguments:** velocities, and a large acceleration.
+    """
+    step = float(np.median(np.asarray(problem.pieces.flown.step)[exists]))
+    driven = all(part.drive is not None for part in problem.segments)
+    period, turning = problem.model.system.period, 0.0
+    if driven:
+        turning = np.max(np.abs(np.asarray(problem.pieces.drive.rate)[exists]))
+    elif period is not None:
+        turning = 2 * math.pi / float(period)
+    rates = {
+        Variable.POSITION: np.max(np.abs(velocity), initial=0.0),
+        Variable.VELOCITY: push,
+        Variable.PHASE: turning,
+        Variable.TIME: 1.0,
+    }
+    return {name: step * float(rate) for name, rate in rates.items()}

@@ -4,6 +4,8 @@ import dataclasses
 import enum
 from typing import Any, NamedTuple
 
+import equinox as eqx
+
 from ...fitting import Fit, Model, Residuals
 from ...hybrid import HybridSystem
 from ...tables import ShortTable
@@ -201,7 +203,11 @@ class Diagnosis:
 
     def model(self, record: int | str = 0) -> Model:
         """Return the model with the missing effects, for use in every other command."""
-        return self.after.model(record)
+        model = self.after.model(record)
+        if not isinstance(model.system, WithTerms):
+            return model
+        exact = tuple(term.exact() for term in model.system.terms)
+        return eqx.tree_at(lambda m: m.system.terms, model, exact)
 
     def system(self, record: int | str = 0) -> HybridSystem:
         """Return the system with the named terms and the functions of unnamed effects.

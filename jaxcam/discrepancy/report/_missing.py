@@ -32,6 +32,8 @@ _KINDS = {
     Where.CONTACT: "surface",
     Where.SENSOR: "sensor",
 }
+# Points that represent a graph, for each one that is kept
+_FINER = 20
 _VERBS = {
     "force": "a force",
     "restitution": "a coefficient of restitution",
@@ -133,11 +135,13 @@ def _hidden(found: Fit, hidden: Hidden, points: int) -> MissingFunction:
 
 def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFunction:
     family, kind = one.family, _KINDS[one.family.where]
-    along = np.linspace(family.low, family.high, points)
     labels = [estimate.name for estimate in found.estimates]
     rows = [labels.index(name) for name in one.coefficients]
     numbers = np.array([found.estimates[row].value for row in rows])
     covariance = found.covariance[np.ix_(rows, rows)]
+    along = np.linspace(family.low, family.high, points)
+    if one.primitive is not None:
+        along = _graded(along, lambda x: _values(one, x, numbers))
     value, basis = _curve(one, along, numbers)
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
     arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
@@ -149,13 +153,13 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
     grid: tuple[np.ndarray, ...] = (along,)
     if len(arguments) == 2:
         ends = positions if family.factor is Factor.DEFLECTION else velocities
-        across = np.linspace(ends[0], ends[1], points)
-        factor = {
-            Factor.VELOCITY: across,
-            Factor.DIRECTION: np.tanh(across / family.slip),
-            Factor.DEFLECTION: across - family.middle,
+        factor_at = {
+            Factor.VELOCITY: lambda x: x,
+            Factor.DIRECTION: lambda x: np.tanh(x / family.slip),
+            Factor.DEFLECTION: lambda x: x - family.middle,
         }[family.factor]
-        grid = (along, across)
+        across = _graded(np.linspace(ends[0], ends[1], points), factor_at)
+        factor, grid = factor_at(across), (along, across)
         value, error = np.outer(value, factor), np.outer(error, np.abs(factor))
     return MissingFunction(
         kind,
@@ -169,6 +173,23 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
         formula,
         numbers=tuple(one.coefficients),
     )
+
+
+def _graded(even: np.ndarray, function) -> np.ndarray:
+    """Return as many points, between which a function is almost linear.
+
+    They are equidistant along its graph in units of its ranges, so that a step has
+    several.
+    """
+    points = len(even)
+    fine = np.linspace(even[0], even[-1], _FINER * points)
+    value = np.asarray(function(fine))
+    size = np.ptp(value)
+    if not np.all(np.isfinite(value)):
+        return even
+    rise = np.abs(np.diff(value)) / (size if size > 0 else 1.0)
+    passed = np.append(0.0, np.cumsum(rise + 1 / len(fine)))
+    return np.interp(np.linspace(0.0, passed[-1], points), passed, fine)
 
 
 def named_function(found: Fit, one: Free | Hidden) -> str:
@@ -189,7 +210,7 @@ def slopes_of_function(
     parameters.
     """
     (term,) = (
-        term
+        term.exact()
         for term in terms_of(found.model())
         if isinstance(term, FreeFunction) and term.label == one.slot
     )
@@ -209,17 +230,19 @@ def _curve(one: Free, along, numbers):
     """Return the function without its factor, and its derivatives with respect to its
     parameters.
     """
+    start = jnp.asarray(numbers)
+    slopes = jax.jacfwd(lambda numbers: _values(one, along, numbers))(start)
+    return np.asarray(_values(one, along, start)), np.asarray(slopes)
+
+
+def _values(one: Free, along, numbers):
+    """Return the function without its factor."""
     family = one.family
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(len(along))
-    free = free_term(family, one.slot, one.primitive)
-
-    def curve(numbers):
-        every = (*numbers, *free.coefficients[len(numbers) :])
-        term = eqx.tree_at(lambda f: f.coefficients, free, tuple(every)).prepared()
-        return jax.vmap(term.at)(jnp.asarray(along), jnp.asarray(direction))
-
-    start = jnp.asarray(numbers)
-    return np.asarray(curve(start)), np.asarray(jax.jacfwd(curve)(start))
+    free = free_term(family, one.slot, one.primitive).exact()
+    every = (*numbers, *free.coefficients[len(numbers) :])
+    term = eqx.tree_at(lambda f: f.coefficients, free, tuple(every)).prepared()
+    return jax.vmap(term.at)(jnp.asarray(along), jnp.asarray(direction))
 
 
 def _unit(family: Family) -> str:

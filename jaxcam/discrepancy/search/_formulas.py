@@ -26,10 +26,10 @@ _GRID = 400
 def formulated(
     fits: FreeFits, found: Missing, apart: Problem, small: float, progress
 ) -> tuple[Missing, list[Missing]]:
-    """Replace the functions of a fit by forms that explain as much.
+    """Replace the functions of a fit by forms that have as much evidence.
 
-    **Arguments:** `apart`: the problem with disconnected pieces. `small`: the allowed
-    loss of evidence, because integration steps across an edge are less accurate.
+    **Arguments:** `apart`: the problem with disconnected pieces. `small`: an increase
+    of the cost above which a form is not fitted further.
 
     **Returns:** the fit, and all fits with forms.
     """
@@ -39,20 +39,22 @@ def formulated(
         one = _in_slot(found, slot)
         if isinstance(one, Hidden) or not one.smooth:
             continue
-        trials = []
-        for primitive, numbers in _promising(fits, found, one):
-            if any(
-                _sound(trial, one) and _enough(fits, found, trial, small)
-                for trial in trials
-            ):
+        least = -math.inf
+        sound: list[Missing] = []
+        for gain, primitive, numbers in _promising(fits, found, one):
+            if gain < least:
                 break
             progress(f"fitting a formula: {primitive.name}", None)
             trial = _fitted(fits, found, apart, one, primitive, numbers, small)
-            trials += [] if trial is None else [trial]
-        sound = [trial for trial in trials if _sound(trial, one)]
+            if trial is None or not _sound(trial, one):
+                continue
+            sound.append(trial)
+            if trial.score < found.score:
+                # only a form that promises as much may have more evidence
+                least = max(least, gain - fits.policy.leads)
         tried += sound
         best = min(sound, key=lambda trial: trial.score, default=found)
-        if best.score < found.score + small:
+        if best.score < found.score + heat_of(found.fit) * fits.policy.form_loss:
             found = best
     return found, tried
 
@@ -68,13 +70,6 @@ def _sound(trial: Missing, one: Free) -> bool:
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
     return math.isfinite(trial.score) and form.primitive.within(numbers)
-
-
-def _enough(fits: FreeFits, found: Missing, trial: Missing, small: float) -> bool:
-    """Return whether a form leaves only noise, with more evidence than the free
-    function.
-    """
-    return trial.score < found.score and leaves_noise(fits, trial, small)
 
 
 def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
@@ -124,9 +119,9 @@ def _fitted(
 
 def _promising(
     fits: FreeFits, found: Missing, one: Free
-) -> list[tuple[Primitive, np.ndarray]]:
-    """Return the forms most similar to a function where the data determine it, with
-    their parameters.
+) -> list[tuple[float, Primitive, np.ndarray]]:
+    """Return the forms most similar to a function where the data determine it: their
+    predicted gain and their parameters.
 
     This uses the quadratic likelihood about the fit, in which a form with size s and
     sines b has the cost of the coefficients `s b`.
@@ -154,7 +149,7 @@ def _promising(
             numbers = np.array([size, *starts[k]])
             ranked.append((gains[k] - primitive.count * price, primitive, numbers))
     ranked.sort(key=lambda each: -each[0])
-    return [(form, numbers) for _, form, numbers in ranked[: fits.policy.followed]]
+    return ranked[: fits.policy.followed]
 
 
 def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.ndarray:

@@ -30,6 +30,9 @@ from ._roughness import Roughness
 
 # Number of sines of a function; one more coefficient represents its jump
 _SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24, Where.SENSOR: 20}
+# Minimum number of substeps for a force that jumps at edges, so that the steps that
+# contain them are accurate
+_SUBSTEPS = 8
 # Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
 _ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
@@ -60,6 +63,12 @@ class Free:
     def smooth(self) -> bool:
         """Return whether it has a smoothness prior."""
         return self.primitive is None
+
+    @property
+    def jumps(self) -> bool:
+        """Return whether it is a force that jumps at edges."""
+        form = self.primitive
+        return self.where is Where.FLIGHT and form is not None and bool(form.apart)
 
     def price(self, samples: int) -> float:
         """Return the gain required for its parameters, without the Occam factor of its
@@ -167,9 +176,14 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
             name: math.sqrt(3) * value if smooth else math.inf
             for name, value in scales.items()
         }
+        pieces = problem.pieces
+        if one.jumps:
+            least = jnp.maximum(pieces.substeps, _SUBSTEPS)
+            pieces = dataclasses.replace(pieces, substeps=least)
         problem = dataclasses.replace(
             problem,
             model=put(problem.model),
+            pieces=pieces,
             layout=eqx.tree_at(
                 lambda part: part.model, problem.layout, put(problem.layout.model)
             ),

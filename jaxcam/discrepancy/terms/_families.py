@@ -3,6 +3,7 @@
 import dataclasses
 import enum
 import math
+from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
@@ -46,6 +47,8 @@ class Family:
     - `middle`: position from which a deflection is measured.
     - `slip`: speed below which the sign of the velocity is smoothed.
     - `motion_unit`: unit of the coordinate.
+    - `stride`: change of the argument of a force in an integration step where it is
+        fast.
     """
 
     where: Where
@@ -56,6 +59,7 @@ class Family:
     middle: float = 0.0
     slip: float = 0.01
     motion_unit: str = "rad"
+    stride: float = 0.0
 
     @property
     def name(self) -> str:
@@ -147,12 +151,14 @@ def families(
     impacting: bool,
     slip: float,
     motion_unit: str,
+    strides: Mapping[Variable, float],
 ) -> tuple[Family, ...]:
     """Return all families over the ranges that the recordings visit.
 
     **Arguments:** smallest and largest position, velocity and approach speed, the
     duration of the recordings (s), whether there is a drive with a phase and whether
-    there are impacts, the slip speed, and the unit of the motion.
+    there are impacts, the slip speed, the unit of the motion, and the changes of the
+    arguments in an integration step.
     """
     ranges = {
         Variable.POSITION: positions,
@@ -171,6 +177,8 @@ def families(
             sum(positions) / 2,
             slip,
             motion_unit,
+            # other functions are not integrated
+            strides.get(argument, 0.0) if where is Where.FLIGHT else 0.0,
         )
 
     phase = (Variable.PHASE,) if turned else ()

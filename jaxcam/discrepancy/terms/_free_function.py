@@ -48,7 +48,9 @@ class FreeFunction(Term):
 
     **Arguments:** `label` of the parameters; `coefficients` of the sines and of a jump;
     `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
-    `factors`, weights that select the argument and the factor; `middle`, `slip`.
+    `factors`, weights that select the argument and the factor; `middle`, `slip`;
+    `stride`, the change of the argument in an integration step, over which derivatives
+    are averaged.
     """
 
     sentence: ClassVar[str] = "an unnamed function"
@@ -63,11 +65,13 @@ class FreeFunction(Term):
     factors: Float[Array, " b"]
     middle: Float[Array, ""]
     slip: Float[Array, ""]
+    stride: Float[Array, ""]
     jumping: Float[Array, ""]
     periodic: Bool[Array, ""]
     form: Float[Array, ""] = eqx.field(default=0.0, converter=_number)
     odd: Float[Array, ""] = eqx.field(default=0.0, converter=_number)
     table: Float[Array, " n"] | None = None
+    softened: Float[Array, " n"] | None = None
     jump: Float[Array, ""] | None = None
 
     def prepared(self):
@@ -77,6 +81,9 @@ class FreeFunction(Term):
         A sine is interpolated at equidistant knots by B-splines whose coefficients are
         its values there divided by `(2 + cos(rate * spacing)) / 3`. The values of a
         form are the coefficients themselves, which smooths its edges over one knot.
+        A second spline, of which only the derivatives are used, smooths jumps over an
+        integration step: otherwise the derivative with respect to the place of an edge
+        is zero in most steps, and much too large in the others.
         """
         first, spacing = self._knots
         knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
@@ -86,19 +93,44 @@ class FreeFunction(Term):
         def sines():
             each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(self.rates * spacing))
             waves = jnp.outer(knots, self.rates) + self.shifts[None]
-            return jnp.sin(waves) @ each, self.jumping * numbers[-1]
+            table = jnp.sin(waves) @ each
+            return table, table, self.jumping * numbers[-1]
 
         def of(one: Primitive):
             def form():
-                return one.function(place, numbers), one.jump * numbers[0]
+                table = softened = one.function(place, numbers)
+                if one.apart is not None:
+                    softened = self._shares(knots, one.apart(numbers)) @ table
+                return table, softened, one.jump * numbers[0]
 
             return form
 
-        table, jump = jax.lax.switch(number, [sines, *map(of, PRIMITIVES)])
         return eqx.tree_at(
-            lambda f: (f.table, f.jump),
+            lambda f: (f.table, f.softened, f.jump),
             self,
-            (table, jump),
+            jax.lax.switch(number, [sines, *map(of, PRIMITIVES)]),
+            is_leaf=lambda x: x is None,
+        )
+
+    def _shares(self, knots, between):
+        """Return the weights of the knots that average over an integration step.
+
+        **Arguments:** the distance between two edges as a fraction of the range, beyond
+        which there is no averaging.
+        """
+        reach = jnp.minimum(self.stride, between * (self.high - self.low))
+        reach = jax.lax.stop_gradient(reach)
+        apart = jnp.abs(knots[:, None] - knots[None])
+        near = 1 - apart / jnp.where(reach > 0, reach, 1.0)
+        shares = jnp.where(apart < reach, near, jnp.eye(_KNOTS))
+        return shares / jnp.sum(shares, axis=1, keepdims=True)
+
+    def exact(self):
+        """Return the function with the derivatives of its values."""
+        return eqx.tree_at(
+            lambda f: (f.stride, f.softened),
+            self,
+            (jnp.zeros_like(self.stride), self.table),
             is_leaf=lambda x: x is None,
         )
 
@@ -142,6 +174,7 @@ class FreeFunction(Term):
             factors=chosen(_FACTORS, family.factor),
             middle=jnp.asarray(family.middle),
             slip=jnp.asarray(family.slip),
+            stride=jnp.asarray(family.stride),
             periodic=jnp.asarray(family.periodic),
             jumping=jnp.asarray(float(family.jumps)),
             motion_unit=family.motion_unit,
@@ -163,15 +196,15 @@ class FreeFunction(Term):
         return self._spline(argument) * turned + self.jump * direction
 
     def _spline(self, argument):
-        """Evaluate the spline."""
-        assert self.table is not None
+        """Evaluate the spline, with the derivatives of the softened one."""
+        assert self.table is not None and self.softened is not None
         width = self.high - self.low
         start, spacing = self._knots
         more = jnp.where(self.form > 0, _BEYOND * width, 0.0)
-        along = argument - self.low
-        within = jnp.clip(along, -more, width + more)
-        along = jnp.where(self.periodic, along % width, within)
-        place = (along + self.low - start) / spacing
+        inside = argument - self.low
+        within = jnp.clip(inside, -more, width + more)
+        inside = jnp.where(self.periodic, inside % width, within)
+        place = (inside + self.low - start) / spacing
         first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
         u = place - first
         first = first.astype(int)
@@ -181,7 +214,12 @@ class FreeFunction(Term):
             (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6,
             u**3 / 6,
         )
-        return sum(w * self.table[first + k] for k, w in enumerate(weights))
+
+        def along(table):
+            return sum(w * table[first + k] for k, w in enumerate(weights))
+
+        soft = along(self.softened)
+        return soft + jax.lax.stop_gradient(along(self.table) - soft)
 
     def _argument(self, motion: Motion, speed):
         options = (motion.position, speed, motion.phase, motion.t)

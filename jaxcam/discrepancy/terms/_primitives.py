@@ -52,6 +52,8 @@ class Primitive(NamedTuple):
       are two, the first is the lower one.
     - `positive`: the parameters that are lengths or exponents.
     - `ends`: further positions, as a function of the parameters.
+    - `apart`: for a form that jumps at edges, the distance between them as a fraction
+        of the range, as a function of the parameters.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Primitive(NamedTuple):
     places: tuple[int, ...] = ()
     positive: tuple[int, ...] = ()
     ends: Callable | None = None
+    apart: Callable | None = None
 
     def within(self, numbers) -> bool:
         """Return whether the positions lie in the range of the argument, in their
@@ -138,6 +141,7 @@ STEP = Primitive(
     (_INSIDE,),
     (0.05,),
     places=(1,),
+    apart=lambda p: 1.0 + 0.0 * p[1],
 )
 WINDOW = Primitive(
     "window",
@@ -145,6 +149,7 @@ WINDOW = Primitive(
     (_INSIDE, _INSIDE),
     (0.05, 0.05),
     places=(1, 2),
+    apart=lambda p: abs(p[2] - p[1]),
 )
 BUMP = Primitive(
     "bump",
@@ -245,12 +250,14 @@ HALF_TURN = Primitive(
     lambda at, p: p[0] * _step(at, at.xp.sin(at.x - p[1])),
     (_EVERY,),
     (0.1,),
+    apart=lambda p: 0.5 + 0.0 * p[1],
 )
 ARC = Primitive(
     "arc",
     lambda at, p: p[0] * _step(at, at.xp.cos(at.x - p[1]) - at.xp.cos(p[2])),
     (_EVERY, _shares(0.2, 2.9, 19)),
     (0.1, 0.1),
+    apart=lambda p: abs(p[2]) / np.pi,
 )
 BUMP_IN_TURN = Primitive(
     "bump in turn",

@@ -224,6 +224,10 @@ class Term(eqx.Module):
         """Return the term with precomputed quantities that it needs at every step."""
         return self
 
+    def exact(self) -> "Term":
+        """Return the term with the derivatives of its values, for use outside a fit."""
+        return self
+
     def strengths(self) -> tuple[Strength, ...]:
         """Return the fitted parameters, in the order of the fields."""
         found = []
