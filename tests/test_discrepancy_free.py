@@ -86,7 +86,7 @@ def test_a_force_is_its_function_times_its_factor(factor, expected):
 def test_a_saved_system_moves_as_the_one_that_was_found(tmp_path):
     family = _family(Variable.POSITION, -2.0, 0.0)
     coefficients = 0.1 * np.random.default_rng(5).normal(size=SINES + 1)
-    term = FREE[Where.FLIGHT].of(family, "a", coefficients)
+    term = FREE[Where.FLIGHT].of(family, "a", coefficients).exact()
     system = WithTerms(ImpactOscillator(), (term,))
     save_system(system, tmp_path / "model.json")
     again = load_system(tmp_path / "model.json", classes=saved_classes())

@@ -39,6 +39,18 @@ def _numbers(values) -> tuple[Array, ...]:
     return tuple(jnp.asarray(value, dtype=float) for value in values)
 
 
+def _shares(knots, reach):
+    """Return the weights `(n, n)` of the knots that average over an integration step.
+
+    **Arguments:** the distance within which knots have a weight, if not zero.
+    """
+    reach = jax.lax.stop_gradient(reach)
+    apart = jnp.abs(knots[:, None] - knots[None])
+    near = 1 - apart / jnp.where(reach > 0, reach, 1.0)
+    shares = jnp.where(apart < reach, near, jnp.eye(_KNOTS))
+    return shares / jnp.sum(shares, axis=1, keepdims=True)
+
+
 class FreeFunction(Term):
     """A function of any family, selected by the values of its arrays.
 
@@ -50,7 +62,7 @@ class FreeFunction(Term):
     `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
     `factors`, weights that select the argument and the factor; `middle`, `slip`;
     `stride`, the change of the argument in an integration step, over which derivatives
-    are averaged.
+    are averaged, or `None`.
     """
 
     sentence: ClassVar[str] = "an unnamed function"
@@ -65,11 +77,11 @@ class FreeFunction(Term):
     factors: Float[Array, " b"]
     middle: Float[Array, ""]
     slip: Float[Array, ""]
-    stride: Float[Array, ""]
     jumping: Float[Array, ""]
     periodic: Bool[Array, ""]
     form: Float[Array, ""] = eqx.field(default=0.0, converter=_number)
     odd: Float[Array, ""] = eqx.field(default=0.0, converter=_number)
+    stride: Float[Array, ""] | None = None
     table: Float[Array, " n"] | None = None
     softened: Float[Array, " n"] | None = None
     jump: Float[Array, ""] | None = None
@@ -89,48 +101,43 @@ class FreeFunction(Term):
         knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
         numbers, number = self.coefficients, self.form.astype(int)
         place = Place.between(knots, self.low, self.high)
+        width = self.high - self.low
 
         def sines():
             each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(self.rates * spacing))
             waves = jnp.outer(knots, self.rates) + self.shifts[None]
-            table = jnp.sin(waves) @ each
-            return table, table, self.jumping * numbers[-1]
+            return both(jnp.sin(waves) @ each), self.jumping * numbers[-1]
 
         def of(one: Primitive):
             def form():
-                table = softened = one.function(place, numbers)
-                if one.apart is not None:
-                    softened = self._shares(knots, one.apart(numbers)) @ table
-                return table, softened, one.jump * numbers[0]
+                table = one.function(place, numbers)
+                return both(table, one.apart), one.jump * numbers[0]
 
             return form
 
+        def both(table, apart=None):
+            """Return a table and the one for its derivatives, if they differ."""
+            if self.stride is None:
+                return table, None
+            if apart is None:
+                return table, table
+            reach = jnp.minimum(self.stride, apart(numbers) * width)
+            return table, _shares(knots, reach) @ table
+
+        tables, jump = jax.lax.switch(number, [sines, *map(of, PRIMITIVES)])
         return eqx.tree_at(
             lambda f: (f.table, f.softened, f.jump),
             self,
-            jax.lax.switch(number, [sines, *map(of, PRIMITIVES)]),
+            (*tables, jump),
             is_leaf=lambda x: x is None,
         )
-
-    def _shares(self, knots, between):
-        """Return the weights of the knots that average over an integration step.
-
-        **Arguments:** the distance between two edges as a fraction of the range, beyond
-        which there is no averaging.
-        """
-        reach = jnp.minimum(self.stride, between * (self.high - self.low))
-        reach = jax.lax.stop_gradient(reach)
-        apart = jnp.abs(knots[:, None] - knots[None])
-        near = 1 - apart / jnp.where(reach > 0, reach, 1.0)
-        shares = jnp.where(apart < reach, near, jnp.eye(_KNOTS))
-        return shares / jnp.sum(shares, axis=1, keepdims=True)
 
     def exact(self):
         """Return the function with the derivatives of its values."""
         return eqx.tree_at(
             lambda f: (f.stride, f.softened),
             self,
-            (jnp.zeros_like(self.stride), self.table),
+            (None, None),
             is_leaf=lambda x: x is None,
         )
 
@@ -197,7 +204,7 @@ class FreeFunction(Term):
 
     def _spline(self, argument):
         """Evaluate the spline, with the derivatives of the softened one."""
-        assert self.table is not None and self.softened is not None
+        assert self.table is not None
         width = self.high - self.low
         start, spacing = self._knots
         more = jnp.where(self.form > 0, _BEYOND * width, 0.0)
@@ -218,6 +225,8 @@ class FreeFunction(Term):
         def along(table):
             return sum(w * table[first + k] for k, w in enumerate(weights))
 
+        if self.softened is None:
+            return along(self.table)
         soft = along(self.softened)
         return soft + jax.lax.stop_gradient(along(self.table) - soft)
 
