@@ -80,9 +80,7 @@ class Policy:
         "the fraction of the explained cost that may remain",
     )
     form_loss: float = _decides(
-        10.0,
-        "difference in BIC, divided by the cost per sample, up to which a worse "
-        "formula replaces a curve",
+        10.0, "loss in BIC (per cost per sample) up to which a formula is kept"
     )
     corner_share: float = _decides(
         3e-4,
@@ -176,9 +174,7 @@ class Policy:
     kept: int = _bounds(3, "number of subsets of each size that are extended")
     tried: int = _bounds(6, "number of subsets fitted at each size above one")
     leads: float = _bounds(
-        50.0,
-        "difference in BIC up to which a subset is extended further, and in predicted "
-        "gain up to which a further form is tried",
+        50.0, "difference in BIC up to which a subset or a form is followed further"
     )
     helped: float = _bounds(
         0.7, "maximum fraction of the cost left by a term for the search to go on"
