@@ -79,9 +79,7 @@ class Policy:
         "maximum relative error of the functional form of a named term; its square is "
         "the fraction of the explained cost that may remain",
     )
-    form_loss: float = _decides(
-        10.0, "loss in BIC (per cost per sample) up to which a formula is kept"
-    )
+    form_loss: float = _decides(10.0, "loss in BIC up to which a formula is kept")
     corner_share: float = _decides(
         3e-4,
         "fraction of the explained cost that the smoothing of dry friction at zero "

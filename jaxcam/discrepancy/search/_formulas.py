@@ -54,7 +54,7 @@ def formulated(
                 least = max(least, gain - fits.policy.leads)
         tried += sound
         best = min(sound, key=lambda trial: trial.score, default=found)
-        if best.score < found.score + heat_of(found.fit) * fits.policy.form_loss:
+        if best.score < found.score + fits.policy.form_loss:
             found = best
     return found, tried
 
