@@ -5,7 +5,6 @@ therefore predicts the gains of any number of forces, without compiling a progra
 each.
 """
 
-import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
@@ -239,7 +238,7 @@ def _linear(
     substeps = jnp.max(pieces.substeps)
 
     def record(arrays, pieces, extras, states, columns, scales):
-        pieces = dataclasses.replace(pieces, substeps=substeps)
+        pieces = eqx.tree_at(lambda p: p.substeps, pieces, substeps)
         size = columns.shape[0]
         near = eqx.combine(arrays, others[0]).by(columns, scales)
 
