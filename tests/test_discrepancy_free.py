@@ -8,6 +8,7 @@ import pytest
 
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.report._missing import _graded
 from jaxcam.discrepancy.search import occam, roughness
 from jaxcam.discrepancy.terms import (
     Factor,
@@ -188,6 +189,28 @@ def test_what_free_parameters_imitate_is_no_function():
         information, score, free, own, family, np.zeros(SINES + 1), POLICY
     )
     assert found.gain < 1e-6
+
+
+def test_only_forces_are_averaged_over_an_integration_step():
+    """The velocity of a surface is a derivative: averaged, it would be another one."""
+    found = families(
+        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
+        turned=True, impacting=True, slip=0.01, motion_unit="m",
+        strides={Variable.TIME: 0.1, Variable.POSITION: 0.2},
+    )  # fmt: skip
+    forces = [one for one in found if one.where is Where.FLIGHT]
+    assert {one.stride for one in forces} == {0.0, 0.1, 0.2}
+    assert all(one.stride == 0 for one in found if one.where is not Where.FLIGHT)
+
+
+def test_a_table_has_several_points_in_a_jump():
+    """Its ends stay; a function that is not finite has equidistant points."""
+    even = np.linspace(0.0, 1.0, 48)
+    graded = _graded(even, lambda x: np.tanh((x - 0.4) / 0.01))
+    assert graded[0] == 0.0 and graded[-1] == pytest.approx(1.0)
+    assert np.all(np.diff(graded) > 0)
+    assert np.sum(np.abs(graded - 0.4) < 0.02) > 8 > np.sum(np.abs(even - 0.4) < 0.02)
+    assert _graded(even, lambda x: np.where(x > 0.5, np.nan, x)) is even
 
 
 def test_families_have_one_place_each_and_different_names():
