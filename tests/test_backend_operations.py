@@ -25,7 +25,7 @@ def _pairs(seed: int, count: int = 200):
     return np.concatenate([every, np.stack([a, b], axis=1)])
 
 
-def _both(function, own, width=None):
+def both(function, own, width=None):
     """Results of the backend and of XLA, each `(count, results)`."""
     own = np.asarray(own)
 
@@ -38,7 +38,7 @@ def _both(function, own, width=None):
     return mine, np.stack([np.asarray(m, dtype=float) for m in made], axis=1)
 
 
-def _assert_equal(mine, made, ulps: float = 0.0, signs: bool = True):
+def assert_equal(mine, made, ulps: float = 0.0, signs: bool = True):
     """Equal up to some units in the last place, NaN and signs of zeros included."""
     np.testing.assert_array_equal(np.isnan(mine), np.isnan(made))
     both = np.isfinite(made)
@@ -71,12 +71,12 @@ _TWO = {
 @pytest.mark.parametrize("name", _TWO)
 def test_arithmetic_is_exact(name, width):
     """Bit by bit, numbers that are none included."""
-    mine, made = _both(_TWO[name], _pairs(1), width)
+    mine, made = both(_TWO[name], _pairs(1), width)
     # results below the normal numbers are zero by XLA
     tiny = (made == 0) & (np.abs(mine) < 2.3e-308)
     # which of two zeros is larger is open
     signs = name not in ("max", "min", "clamped")
-    _assert_equal(np.where(tiny, made, mine), made, signs=signs)
+    assert_equal(np.where(tiny, made, mine), made, signs=signs)
 
 
 _ONE = {
@@ -100,14 +100,14 @@ _ONE = {
 @pytest.mark.parametrize("name", _ONE)
 def test_functions_of_one_number_are_exact(name):
     numbers = np.concatenate([_numbers(2, 300), np.arange(-40, 41) / 4])
-    mine, made = _both(_ONE[name], numbers[:, None])
+    mine, made = both(_ONE[name], numbers[:, None])
     if name == "inverse powers":
         # a power that is below the normal numbers is zero by XLA
         made = np.where(np.isinf(made) & (np.abs(mine) > 4e307), mine, made)
     if name == "narrow":
         made = np.where((made == 0) & (np.abs(mine) < 1.2e-38), mine, made)
     tiny = (made == 0) & (np.abs(mine) < 2.3e-308)
-    _assert_equal(np.where(tiny, made, mine), made)
+    assert_equal(np.where(tiny, made, mine), made)
 
 
 def _true(name: str, x):
@@ -136,7 +136,7 @@ def test_exponentials_and_logarithms_err_by_one_ulp(name, low, high):
         wide = np.exp(rng.uniform(np.log(low), np.log(high), 500))
         near = np.abs(near)
     x = np.concatenate([near, wide])
-    mine, _ = _both(getattr(jnp, name), x[:, None])
+    mine, _ = both(getattr(jnp, name), x[:, None])
     error = np.abs(mine[:, 0] - _true(name, x)) / np.spacing(np.abs(_true(name, x)))
     assert np.max(error) <= 1.0
 
@@ -165,7 +165,7 @@ def test_other_functions_err_by_little(name):
     rng = np.random.default_rng(4)
     x = np.concatenate([rng.uniform(-1, 1, 300), rng.uniform(-most, most, 300)])
     x = np.abs(x) if name in ("log1p", "cbrt") else x
-    mine, _ = _both(function, x[:, None])
+    mine, _ = both(function, x[:, None])
     exact = _true(known, x)
     assert np.max(np.abs(mine[:, 0] - exact) / np.spacing(np.abs(exact))) <= 2.0
 
@@ -176,7 +176,7 @@ _EDGES = [*_SPECIAL, 709.7, 709.9, -745.0, -746.0, -750.5, 1024.5, 0.999, -0.999
 @pytest.mark.parametrize("name", [*_SLOW_ONES, "exp", "log"])
 def test_infinities_and_no_numbers_are_as_by_xla(name):
     function = _SLOW_ONES[name][0] if name in _SLOW_ONES else getattr(jnp, name)
-    mine, made = _both(function, np.array(_EDGES)[:, None])
+    mine, made = both(function, np.array(_EDGES)[:, None])
     np.testing.assert_array_equal(np.isnan(mine), np.isnan(made))
     np.testing.assert_array_equal(np.isinf(mine), np.isinf(made))
     np.testing.assert_allclose(mine, made, rtol=1e-12, atol=4e-308)
@@ -187,10 +187,10 @@ def test_powers_and_angles_agree_with_those_of_xla():
     pairs = pairs[np.all((np.abs(pairs) < 1e100) | ~np.isfinite(pairs), axis=1)]
     pairs = pairs[np.all((np.abs(pairs) > 1e-100) | (pairs == 0), axis=1)]
     for function in (jnp.arctan2, jnp.power):
-        mine, made = _both(function, pairs)
+        mine, made = both(function, pairs)
         normal = (np.abs(made) > 2.3e-308) | (made == 0) | np.isnan(made)
         keep = normal[:, 0] & (np.abs(mine[:, 0]) != 5e-324)
-        _assert_equal(mine[keep], made[keep], 8.0)
+        assert_equal(mine[keep], made[keep], 8.0)
 
 
 def test_integers_are_as_those_of_xla():
@@ -220,8 +220,8 @@ def test_integers_are_as_those_of_xla():
             a.astype(jnp.uint32) // jnp.maximum(b.astype(jnp.uint32), 1),
         ]
 
-    mine, made = _both(function, pairs)
-    _assert_equal(mine, made)
+    mine, made = both(function, pairs)
+    assert_equal(mine, made)
 
 
 def _array(a, b, c):
@@ -274,7 +274,7 @@ def _indices(x):
 def test_small_arrays(name):
     """To rounding: sums may be taken in another order."""
     own = np.random.default_rng(6).normal(size=(50, 3)) * 1.5
-    mine, made = _both(lambda *row: list(_ARRAYS[name](_array(*row))), own)
+    mine, made = both(lambda *row: list(_ARRAYS[name](_array(*row))), own)
     np.testing.assert_allclose(mine, made, rtol=1e-13, atol=1e-14)
 
 
@@ -330,7 +330,7 @@ _CONTROL = {
 def test_branches_and_loops(name, width):
     """Batch elements that go different ways do not disturb each other."""
     own = np.random.default_rng(7).normal(size=(37, 2))
-    mine, made = _both(_CONTROL[name], own, width)
+    mine, made = both(_CONTROL[name], own, width)
     np.testing.assert_allclose(mine, made, rtol=1e-12, atol=1e-13)
 
 

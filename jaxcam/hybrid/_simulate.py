@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Int
 
 from ..parameters import as_arrays, FloatScalar, real_array, VectorLike
+from ._prepared import prepared
 from ._settings import Settings
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
@@ -141,7 +142,9 @@ def simulate(
         log, mode, code = run_untraced(
             system, settings, t_start, state, t1, budget, progress
         )
-        parts = _assemble(system, t_start, state, mode, log, settings.compiles)
+        parts = _assemble(
+            prepared(system), t_start, state, mode, log, settings.compiles
+        )
     return _trajectory(system, settings, t0, t1, _trim(parts), code)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 
+from ._prepared import prepared
 from ._settings import Settings
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
@@ -67,7 +68,7 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
             "so interchange them"
         )
     check_system(system, t0, state, settings)
-    case = system, t0, state
+    case = prepared(system), t0, state
     behind, values = _STARTS_BEHIND.once(case, compiles=settings.compiles)
     if not np.all(np.isfinite(values)):
         raise ValueError("the gap is not finite at t0; check the state and parameters")
@@ -101,12 +102,13 @@ def check_system(system, t0, state, settings: Settings) -> None:
             raise ValueError(
                 "a parameter of the system is not finite; print the system to see which"
             )
+    ready = prepared(system)
     if signature not in _WELL_SHAPED:
-        _check_shapes(system, t0, state)
+        _check_shapes(ready, t0, state)
     system.check()
     if isinstance(system, SwitchedSystem):
         _check_switches(system)
-    found = _RESTITUTIONS.once((system, t0, state), compiles=settings.compiles)
+    found = _RESTITUTIONS.once((ready, t0, state), compiles=settings.compiles)
     check_restitution(system, found)
     if signature is not None:
         _WELL_SHAPED.add(signature)

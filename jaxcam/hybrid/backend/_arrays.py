@@ -15,6 +15,7 @@ import numpy as np
 
 from ..lowering import is_known, join_known, rearranged
 from ._elementwise import elementwise
+from ._lookup import fill_of, looked_up_in_memory
 from ._writer import Lacking, Writer
 
 
@@ -28,7 +29,7 @@ MOVES = frozenset(
 # maximum number of values that a scatter may combine: the bits of a float
 _BITS = 52
 # maximum size of a table whose elements are selected by comparison with an unknown
-# index; XLA compiles longer ones sooner
+# index; longer ones are read from memory
 _MOST = 64
 
 
@@ -64,7 +65,7 @@ def moved(equation, inputs) -> list[np.ndarray]:
         made = equation.primitive.bind(*sent, **params)
     made = made if equation.primitive.multiple_results else [made]
     outside = np.empty(1, dtype=object)
-    outside[0] = _fill(equation)
+    outside[0] = fill_of(equation)
     table = np.concatenate([outside, *flat])
     found = []
     for places in map(np.asarray, made):
@@ -72,15 +73,6 @@ def moved(equation, inputs) -> list[np.ndarray]:
         out.ravel()[:] = table[places.ravel()]
         found.append(out)
     return found
-
-
-def _fill(equation):
-    """Return the value of a gather outside the array."""
-    dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
-    if value is None:
-        inexact = np.issubdtype(dtype, np.inexact)
-        value = np.nan if inexact else np.iinfo(dtype).min if dtype != bool else True
-    return np.dtype(dtype).type(value)
 
 
 def _indices_of(name: str, count: int) -> tuple[int, ...]:
@@ -185,7 +177,11 @@ def _by_comparison(w: Writer, equation, inputs, places, room, clips, dtypes):
     given = np.concatenate([inputs[i].ravel() for i in places])
     dtype = dtypes[places[0]]
     if np.prod(room) > _MOST:
-        raise Lacking(f"{equation.primitive.name} from {np.prod(room)} places")
+        name = equation.primitive.name
+        if name == "dynamic_update_slice":
+            raise Lacking(f"{name} at {np.prod(room)} places")
+        kinds = dtypes[0], dtype
+        return [looked_up_in_memory(w, equation, inputs[0], given, kinds)]
 
     def result_at(candidate):
         sent, left = list(inputs), list(candidate)
@@ -214,7 +210,7 @@ def _by_comparison(w: Writer, equation, inputs, places, room, clips, dtypes):
     made = result_at(candidates[0])
     if not clips:
         first = np.empty(made.shape, dtype=object)
-        first.ravel()[:] = [_fill(equation)] * made.size
+        first.ravel()[:] = [fill_of(equation)] * made.size
         made, candidates = first, [None, *candidates]
     for candidate in candidates[1:]:
         flag, there = here(candidate), result_at(candidate)

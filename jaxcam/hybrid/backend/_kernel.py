@@ -19,7 +19,7 @@ from ._arrays import element, elements
 from ._elementwise import converted
 from ._emit import Emitter
 from ._ptx import thread
-from ._writer import DOUBLE, INT64, Writer
+from ._writer import DOUBLE, INT64, Place, Writer
 
 
 # name of the function in each module
@@ -116,6 +116,7 @@ class _Kernel:
         self.shared = [
             self._load(self.a.shared, self._int(k)) for k in range(self.p.shared)
         ]
+        self.w.remember(self.shared, Place(self.a.shared, 0))
         start = b.block
         b.branch(refill)
 
@@ -301,6 +302,8 @@ class _Kernel:
             for value, dtype in zip(columns, p.dtypes)
         ]
         own = columns[self.states :]
+        across = self.slots.number, self.slots.first
+        self.w.remember(own, Place(self.a.slots, self.states, *across))
         numbers = [elements(part) for part in (own, self.shared)]
         made = Emitter(self.w).program(p.jaxpr, p.consts, [*numbers, *leaves])
         dtypes = [v.aval.dtype for v in p.jaxpr.outvars]

@@ -12,7 +12,7 @@ from jax.interpreters import partial_eval
 from ._elementwise import converted
 from ._emit import Emitter
 from ._machine import compiled, vector_width
-from ._writer import DOUBLE, INT64, Writer
+from ._writer import DOUBLE, INT64, Place, Writer
 
 
 _FLOAT = np.dtype(np.float64)
@@ -52,6 +52,7 @@ def _module_of(traced: _Traced, width: int) -> ir.Module:
 
     numbers = np.empty(traced.shared, dtype=object)
     numbers[:] = [b.load(b.gep(shared, [number(k)])) for k in range(traced.shared)]
+    writer.remember(numbers, Place(shared, 0))
     before, block = b.block, b.append_basic_block("block")
     b.branch(block)
     b.position_at_end(block)
@@ -65,6 +66,7 @@ def _module_of(traced: _Traced, width: int) -> ir.Module:
 
     mine = np.empty(traced.own, dtype=object)
     mine[:] = [b.load(column(own, k), align=8) for k in range(traced.own)]
+    writer.remember(mine, Place(own, 0, count, first))
     results = Emitter(writer).program(traced.jaxpr, traced.consts, [numbers, mine])
     for k, (element, v) in enumerate(zip(results, traced.jaxpr.outvars, strict=True)):
         value = element[()]

@@ -6,7 +6,7 @@ moves computations with such values out of the loop.
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import llvmlite.ir as ir
 import numpy as np
@@ -68,6 +68,17 @@ def is_float(dtype) -> bool:
     return np.issubdtype(dtype, np.floating)
 
 
+class Place(NamedTuple):
+    """Where a value was loaded from: row `index` of an array in memory."""
+
+    pointer: Any
+    index: int
+    # distance of two rows, and first batch element; `None` if the array is shared by
+    # all batch elements
+    stride: Any = None
+    first: Any = None
+
+
 class Writer:
     """Emits instructions into one function; `width` batch elements fit into a
     vector.
@@ -77,6 +88,15 @@ class Writer:
         self.module, self.builder, self.width = module, builder, width
         # in branches and loops: the batch elements for which the result is used
         self.mask: Any = None
+        # where loaded values are in memory, by the identity of the values
+        self.places: dict[int, Place] = {}
+        # tables of known numbers
+        self.constants: dict[tuple[str, bytes], ir.GlobalVariable] = {}
+
+    def remember(self, values, first: Place) -> None:
+        """Remember that values were loaded from consecutive rows of an array."""
+        for k, value in enumerate(values):
+            self.places[id(value)] = first._replace(index=first.index + k)
 
     def vector(self, kind):
         """Return the type of a value that differs between batch elements."""

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._elements import join, split, traced
+from ._elements import join_traced, split
 from ._known import join_known
 
 
@@ -66,7 +66,7 @@ def moved(equation, inputs, memory):
         )
     if target.size and (target.min() < 0 or target.max() >= first.size):
         # a gather with a fill value outside the range
-        whole = join(traced(first, memory))
+        whole = join_traced(first, memory)
         return split(equation.primitive.bind(whole, *others, **params))
     out = np.empty(target.shape, dtype=object)
     out.ravel()[:] = first.ravel()[target.ravel()]

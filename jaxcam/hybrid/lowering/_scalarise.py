@@ -18,7 +18,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import Literal
 
-from ._elements import boxed, join, split as split, traced
+from ._elements import boxed, join, join_traced, split as split, traced
 from ._jaxprs import has_saving_rule, opened, without_unused
 from ._known import computed, is_known, join_known
 from ._moves import moved, MOVES
@@ -164,7 +164,7 @@ def _apply(equation, inputs, memory):
         return _by_derivatives(equation, inputs, memory)
     # a user-defined rule, such as a custom derivative, is among these parameters
     params = equation.primitive.get_bind_params(params)
-    made = equation.primitive.bind(*[join(traced(i, memory)) for i in inputs], **params)
+    made = equation.primitive.bind(*[join_traced(i, memory) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
     return [split(m) for m in made]
 

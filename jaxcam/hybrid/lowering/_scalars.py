@@ -31,11 +31,26 @@ class Scalar:
         self.dtype, self.value = dtype, value
 
 
+class Part:
+    """An element of a long array, which is read from the array only when needed."""
+
+    __slots__ = ("whole", "index", "dtype")
+
+    def __init__(self, whole, index: tuple[int, ...]):
+        self.whole, self.index, self.dtype = whole, index, whole.dtype
+
+
+def _read(whole, *index):
+    return whole[index]
+
+
 class Memory:
     """The operations of one trace."""
 
     def __init__(self):
         self.made: dict[Any, Scalar] = {}
+        # the scalars of elements of long arrays
+        self.parts: dict[Any, Scalar] = {}
         # the scalars of traced values, by the identity of these
         self.traced: dict[int, Scalar] = {}
 
@@ -44,6 +59,12 @@ class Memory:
         """Return a traced value as a scalar; known numbers remain as they are."""
         if isinstance(element, Scalar) or is_known(element):
             return element
+        if isinstance(element, Part):
+            key = id(element.whole), element.index
+            if key not in self.parts:
+                operands = (element.whole, *element.index)
+                self.parts[key] = Scalar(_read, None, operands, element.dtype)
+            return self.parts[key]
         found = self.traced.get(id(element))
         if found is None:
             found = Scalar(None, None, (), element.dtype, element)
@@ -95,6 +116,8 @@ def _place(key):
 @no_type_check
 def forced(element, memory: Memory):
     """Return the traced value of a scalar; other elements are values already."""
+    if isinstance(element, Part):
+        element = memory.scalar(element)
     if not isinstance(element, Scalar):
         return element
     waiting = [element]
