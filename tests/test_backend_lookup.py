@@ -32,9 +32,7 @@ _LOOKUPS = {
     "slice": lambda x, y: list(
         lax.dynamic_slice(jnp.asarray(_TABLE), (_place(x),), (3,))
     ),
-    "short index": lambda x, y: (
-        jnp.asarray(_TABLE)[jnp.floor(x).astype(jnp.int32)] * y
-    ),
+    "short index": lambda x, y: jnp.asarray(_TABLE)[jnp.floor(x).astype(jnp.int32)] * y,
     "several": lambda x, y: jnp.sum(
         jnp.asarray(_TABLE)[jnp.stack([_place(x), _place(y)])]
     ),
@@ -66,7 +64,9 @@ def test_lookups_are_those_of_xla(name, width):
 @pytest.mark.parametrize("width", sorted({1, 2, vector_width()}))
 def test_lookups_in_arrays_of_each_element_and_of_all(width):
     """A table that all batch elements share, and one for each of them."""
-    own = np.concatenate([_RNG.uniform(-3, 103, (37, 1)), _RNG.normal(size=(37, 100))], 1)
+    own = np.concatenate(
+        [_RNG.uniform(-3, 103, (37, 1)), _RNG.normal(size=(37, 100))], 1
+    )
 
     def looked_up(shared, own):
         at = _place(own[0])
@@ -127,7 +127,9 @@ def test_the_program_of_a_table_has_few_operations():
 
     def size(number: int) -> int:
         system = _Follower(_heights(number))
-        made = jax.make_jaxpr(lambda x: simulate(system, x, 0.0, 0.1, max_steps=8).final)
+        made = jax.make_jaxpr(
+            lambda x: simulate(system, x, 0.0, 0.1, max_steps=8).final
+        )
         return len(str(made(jnp.array([0.3, 0.0]))).splitlines())
 
     assert size(2000) < 1.1 * size(80)

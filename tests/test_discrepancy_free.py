@@ -117,6 +117,21 @@ def test_the_prior_has_variance_one_on_average(length):
     assert 0.9 < np.mean(variance) < 1.4
 
 
+@pytest.mark.parametrize("length", [0.1, 0.4, 1.6])
+def test_the_prior_of_a_phase_has_variance_one_and_contains_a_constant(length):
+    """The variance to a tenth, as one sine of the highest order is left out; an arc
+    with its mean to a fifth of its rms."""
+    family = _family(Variable.PHASE, 0.0, 2 * math.pi)
+    at = np.linspace(0.0, 2 * math.pi, 400, endpoint=False)
+    basis = free_basis(family, at, SINES + 1)[:, :-1]
+    variance = basis**2 @ family.variances(SINES, length)
+    np.testing.assert_allclose(variance, 1.0, atol=0.1)
+    assert np.mean(variance) == pytest.approx(1.0, rel=1e-12)
+    arc = 1.0 * (np.cos(at - 2.0) > 0.6)
+    fitted = basis @ np.linalg.lstsq(basis, arc)[0]
+    assert np.sqrt(np.mean((fitted - arc) ** 2)) < 0.2 * np.sqrt(np.mean(arc**2))
+
+
 def test_the_gain_is_the_marginal_likelihood():
     """Against a Gaussian likelihood written down directly, to 1e-8."""
     rng = np.random.default_rng(2)

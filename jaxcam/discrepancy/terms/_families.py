@@ -105,12 +105,16 @@ class Family:
         return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
 
     def waves(self, count: int) -> tuple[Array, Array]:
-        """Return rates and shifts of `count` sines of the argument, each `(count,)`."""
+        """Return rates and shifts of `count` sines of the argument, each `(count,)`.
+
+        Those of a phase begin with a constant: not every rig has a parameter that
+        represents one, such as the rest position of a spring.
+        """
         if self.periodic:
-            half = count // 2
-            orders = np.arange(1.0, half + 1)
-            rates = np.concatenate([orders, orders])
-            shifts = np.repeat([math.pi / 2, 0.0], half)
+            cosines = np.arange(0.0, count // 2 + 1)
+            sines = np.arange(1.0, count - len(cosines) + 1)
+            rates = np.concatenate([cosines, sines])
+            shifts = np.repeat([math.pi / 2, 0.0], [len(cosines), len(sines)])
         else:
             width = (self.high - self.low) * (1 + 2 * _MARGIN)
             rates = math.pi * np.arange(1.0, count + 1) / width
@@ -127,8 +131,11 @@ class Family:
         unit = 1.0 if self.periodic else self.high - self.low
         # spectral density of a Matern kernel of order 3/2 in one dimension
         density = (1 + (rates * unit * length) ** 2 / 3) ** -2.0
-        mean = 1.0 if self.periodic else 0.5
-        return density / (mean * np.sum(density))
+        # a constant stands for the wave of one sign of the rate, the others for both
+        constant = rates == 0
+        density = np.where(constant, density / 2, density)
+        squares = np.where(constant, 1.0, 0.5)
+        return density / np.sum(squares * density)
 
 
 def free_basis(
