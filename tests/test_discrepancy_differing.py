@@ -7,6 +7,9 @@ import pytest
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.evidence._differing import differing
+from jaxcam.discrepancy.search._roughness import Roughness
+from jaxcam.discrepancy.search._slots import filled, Free, roomy
+from jaxcam.discrepancy.terms import Family, Variable, Where, WithTerms
 from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
 from jaxcam.recordings import Recording, segment
 
@@ -85,3 +88,21 @@ def test_a_force_common_to_the_recordings_is_no_difference():
         _fitted([_free(x, DAMPING) + settled for x in (0.1, 0.1)]), Policy()
     )
     assert found is None
+
+
+def test_a_form_that_jumps_has_more_substeps():
+    """At least 8 in every recording, while its curve and a smooth form keep theirs."""
+    noisy = _free(0.2, 0.3) + NOISE * np.random.default_rng(4).normal(size=len(TIME))
+    run = Recording("run", TIME, {"angle_rad": noisy})
+    model = Model(WithTerms(Swing()), {"angle_rad": Sensor(0, noise=NOISE)})
+    problem = Problem.build(model, [segment(run, "angle_rad", noise=NOISE)], [])
+    family = Family(Where.FLIGHT, Variable.TIME, 0.0, 2.5)
+    room = roomy(problem, family, False, None)
+    before = np.asarray(room.pieces.substeps)
+    assert np.all(before < 8)
+    forms = {one.name: one for one in family.primitives}
+    for name, least in ((None, 0), ("step", 8), ("window", 8), ("bump", 0)):
+        form = forms[name] if name else None
+        one = Free(family, Roughness(), "force_a", form)
+        made = np.asarray(filled(room, [one]).pieces.substeps)
+        np.testing.assert_array_equal(made, np.maximum(before, least))

@@ -19,6 +19,7 @@ from jaxcam.discrepancy import (
 )
 from jaxcam.discrepancy.evidence import rms_of
 from jaxcam.discrepancy.report import Reason
+from jaxcam.discrepancy.terms import FREE, Where
 from jaxcam.fitting import Parameter, Sensor
 from jaxcam.recordings import Recording, References, segment
 
@@ -239,8 +240,11 @@ def test_a_force_that_no_term_has_is_unknown():
     # one of two releases says little of what the other one visits
     if found.heldout_after > found.heldout_before:
         assert "predict" in found.summary
-    # and is part of the system that was found
-    assert "FreeForce" in str(found.system())
+    # and is part of the system that was found, with the derivatives of its values
+    for system in (found.system(), found.model().system):
+        free = [t for t in system.terms if isinstance(t, FREE[Where.FLIGHT])]
+        assert free
+        assert all(one.stride is None for one in free)
 
 
 def test_a_term_of_ones_own_is_named():

@@ -51,6 +51,65 @@ def _shares(knots, reach):
     return shares / jnp.sum(shares, axis=1, keepdims=True)
 
 
+def _knots(low, high):
+    """Return where the spline begins, and the spacing of its knots."""
+    width = high - low
+    return low - _BEYOND * width, width * (1 + 2 * _BEYOND) / (_KNOTS - 3)
+
+
+# compiled by themselves, so that they are traced once for all functions of a program
+@jax.jit
+def _splines(numbers, number, waves, ends, jumping, stride):
+    """Return the coefficients of the spline, those for its derivatives if they differ
+    (otherwise `None`), and the jump.
+    """
+    (rates, shifts), (low, high) = waves, ends
+    first, spacing = _knots(low, high)
+    knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
+    place = Place.between(knots, low, high)
+
+    def sines():
+        each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(rates * spacing))
+        phases = jnp.outer(knots, rates) + shifts[None]
+        return both(jnp.sin(phases) @ each), jumping * numbers[-1]
+
+    def of(one: Primitive):
+        def form():
+            table = one.function(place, numbers)
+            return both(table, one.apart), one.jump * numbers[0]
+
+        return form
+
+    def both(table, apart=None):
+        if stride is None:
+            return table, None
+        if apart is None:
+            return table, table
+        reach = jnp.minimum(stride, apart(numbers) * (high - low))
+        return table, _shares(knots, reach) @ table
+
+    return jax.lax.switch(number, [sines, *map(of, PRIMITIVES)])
+
+
+@jax.jit
+def _interpolated(tables, place):
+    """Return the values of splines at a position in units of their knots."""
+    first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
+    u = place - first
+    first = first.astype(int)
+    weights = (
+        (1 - u) ** 3 / 6,
+        (3 * u**3 - 6 * u**2 + 4) / 6,
+        (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6,
+        u**3 / 6,
+    )
+
+    def along(table):
+        return sum(w * table[first + k] for k, w in enumerate(weights))
+
+    return jax.tree.map(along, tables)
+
+
 class FreeFunction(Term):
     """A function of any family, selected by the values of its arrays.
 
@@ -97,34 +156,14 @@ class FreeFunction(Term):
         integration step: otherwise the derivative with respect to the place of an edge
         is zero in most steps, and much too large in the others.
         """
-        first, spacing = self._knots
-        knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
-        numbers, number = self.coefficients, self.form.astype(int)
-        place = Place.between(knots, self.low, self.high)
-        width = self.high - self.low
-
-        def sines():
-            each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(self.rates * spacing))
-            waves = jnp.outer(knots, self.rates) + self.shifts[None]
-            return both(jnp.sin(waves) @ each), self.jumping * numbers[-1]
-
-        def of(one: Primitive):
-            def form():
-                table = one.function(place, numbers)
-                return both(table, one.apart), one.jump * numbers[0]
-
-            return form
-
-        def both(table, apart=None):
-            """Return a table and the one for its derivatives, if they differ."""
-            if self.stride is None:
-                return table, None
-            if apart is None:
-                return table, table
-            reach = jnp.minimum(self.stride, apart(numbers) * width)
-            return table, _shares(knots, reach) @ table
-
-        tables, jump = jax.lax.switch(number, [sines, *map(of, PRIMITIVES)])
+        tables, jump = _splines(
+            self.coefficients,
+            self.form.astype(int),
+            (self.rates, self.shifts),
+            (self.low, self.high),
+            self.jumping,
+            self.stride,
+        )
         return eqx.tree_at(
             lambda f: (f.table, f.softened, f.jump),
             self,
@@ -140,12 +179,6 @@ class FreeFunction(Term):
             (None, None),
             is_leaf=lambda x: x is None,
         )
-
-    @property
-    def _knots(self):
-        """Return where the spline begins, and the spacing of its knots."""
-        width = self.high - self.low
-        return self.low - _BEYOND * width, width * (1 + 2 * _BEYOND) / (_KNOTS - 3)
 
     @classmethod
     def of(
@@ -206,29 +239,14 @@ class FreeFunction(Term):
         """Evaluate the spline, with the derivatives of the softened one."""
         assert self.table is not None
         width = self.high - self.low
-        start, spacing = self._knots
+        start, spacing = _knots(self.low, self.high)
         more = jnp.where(self.form > 0, _BEYOND * width, 0.0)
         inside = argument - self.low
         within = jnp.clip(inside, -more, width + more)
         inside = jnp.where(self.periodic, inside % width, within)
         place = (inside + self.low - start) / spacing
-        first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
-        u = place - first
-        first = first.astype(int)
-        weights = (
-            (1 - u) ** 3 / 6,
-            (3 * u**3 - 6 * u**2 + 4) / 6,
-            (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6,
-            u**3 / 6,
-        )
-
-        def along(table):
-            return sum(w * table[first + k] for k, w in enumerate(weights))
-
-        if self.softened is None:
-            return along(self.table)
-        soft = along(self.softened)
-        return soft + jax.lax.stop_gradient(along(self.table) - soft)
+        value, soft = _interpolated((self.table, self.softened), place)
+        return value if soft is None else soft + jax.lax.stop_gradient(value - soft)
 
     def _argument(self, motion: Motion, speed):
         options = (motion.position, speed, motion.phase, motion.t)
