@@ -6,6 +6,7 @@ from pathlib import Path
 from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
+from ._elsewhere import falls_short, sought_elsewhere
 from ._mappings import make_room
 from ._set_aside import odd_record, set_aside
 from .evidence import choose, ripple_of
@@ -20,7 +21,7 @@ from .search import (
     system_question,
     Trials,
 )
-from .terms import Term
+from .terms import Location, Term
 
 
 def diagnose(
@@ -39,7 +40,10 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose from recordings which physics a model lacks.
 
-    A diagnosis takes minutes; the notebooks contain an example.
+    A diagnosis takes minutes; the notebooks contain an example. Terms of the library
+    and functions act on the first coordinate and the first gap. Only if they leave a
+    residual above the noise are they sought at the other ones as well, which takes as
+    long again for each.
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
@@ -70,11 +74,32 @@ def diagnose(
     report = progress or (lambda sentence, fraction: None)
     make_room()
 
-    def asked(runs: Sequence[Recording | Segments], folder: Path | None) -> Diagnosis:
+    def asked(
+        runs: Sequence[Recording | Segments],
+        folder: Path | None,
+        location: Location = Location(),
+    ) -> Diagnosis:
         question = _question(
-            system, runs, candidates, sensors, parameters, drive, report, policy
+            system,
+            runs,
+            candidates,
+            sensors,
+            parameters,
+            drive,
+            report,
+            policy,
+            location,
         )
         return _answered(question, case, seed, report, folder, policy)
+
+    def asked_at(location: Location) -> Diagnosis:
+        report(
+            f"seeking at coordinate {location.coordinate + 1}, gap "
+            f"{location.constraint + 1}",
+            None,
+        )
+        name = "at_{}_{}".format(*location)
+        return asked(recordings, None if keep is None else keep / name, location)
 
     found = asked(recordings, keep)
     odd = odd_record(found)
@@ -83,6 +108,8 @@ def diagnose(
         others = [run for run in recordings if _name_of(run) != odd]
         folder = None if keep is None else keep / "without_one"
         found = set_aside(found, asked(others, folder), odd)
+    elif falls_short(found):
+        found = sought_elsewhere(found, asked_at)
     return found
 
 
@@ -91,13 +118,21 @@ def _name_of(run: Recording | Segments) -> str:
 
 
 def _question(
-    system, recordings, candidates, sensors, parameters, drive, report, policy
+    system,
+    recordings,
+    candidates,
+    sensors,
+    parameters,
+    drive,
+    report,
+    policy,
+    location: Location,
 ) -> Question:
     """Return the question to be answered for a rig, a setup or a bare system."""
     if isinstance(system, Rig):
         return rig_question(system, recordings, candidates, report, policy)
     if isinstance(system, Setup):
-        return setup_question(system, recordings, candidates, report, policy)
+        return setup_question(system, recordings, candidates, report, policy, location)
     return system_question(
         system,
         tuple(recordings),
@@ -107,6 +142,7 @@ def _question(
         drive,
         report,
         policy,
+        location=location,
     )
 
 

@@ -80,6 +80,7 @@ class Policy:
         "the fraction of the explained cost that may remain",
     )
     form_loss: float = _decides(10.0, "loss in BIC up to which a formula is kept")
+    elsewhere: float = _decides(0.5, "largest share of a residual left elsewhere")
     corner_share: float = _decides(
         3e-4,
         "fraction of the explained cost that the smoothing of dry friction at zero "
@@ -221,9 +222,7 @@ class Policy:
     promising: float = _bounds(
         0.5, "minimum gain of a free function that is fitted, relative to the largest"
     )
-    rivalling: float = _bounds(
-        0.9, "the same minimum if another function already explains the data"
-    )
+    rivalling: float = _bounds(0.9, "the same minimum if a function explains the data")
     followed: int = _bounds(
         3, "maximum number of free functions, terms and forms fitted per stage"
     )

@@ -142,9 +142,7 @@ def simulate(
         log, mode, code = run_untraced(
             system, settings, t_start, state, t1, budget, progress
         )
-        parts = _assemble(
-            prepared(system), t_start, state, mode, log, settings.compiles
-        )
+        parts = _assemble(system, t_start, state, mode, log, settings.compiles)
     return _trajectory(system, settings, t0, t1, _trim(parts), code)
 
 
@@ -232,6 +230,7 @@ def _of_rows(runner, system, settings, t0, state, t1, rows):
 def _assemble(system, t0, state, mode, log: Log, compiles: bool = False) -> Parts:
     """Assemble the parts of a run that is not traced."""
     t0, state, mode, log = jax.tree.map(np.asarray, (t0, state, mode, log))
+    system = prepared(system)
     log = Log(*(part[log.kind > 0] for part in log))
     rows, width = log.mode.shape
     # contacts at the start do not belong to any row

@@ -1,7 +1,7 @@
 """Assess a verdict: bootstrap, held-out data, residual structure, detection limits."""
 
 from ._choice import Choice as Choice, choose as choose, Outside as Outside
-from ._differing import Differing as Differing
+from ._differing import above_noise as above_noise, Differing as Differing
 from ._held_out import HeldOut as HeldOut, rms_of as rms_of
 from ._limits import Limit as Limit, limits as limits
 from ._redrawn import Needs as Needs

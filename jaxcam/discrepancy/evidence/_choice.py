@@ -224,6 +224,7 @@ def _without_a_name(
         slip=question.references.slip_speed,
         motion_unit=question.unit,
         strides=visited.strides,
+        constraint=question.location.constraint,
     )
 
     def searched(elements: bool, policy: Policy = policy):

@@ -170,6 +170,10 @@ class Diagnosis:
     """A parameter with separate values in the recordings, which explain most of the
     residual of the chosen model; `differing.fit` is the fit with them.
     """
+    location: tuple[str, str] | None = None
+    """Names of the coordinate and of the gap on which the effects act; `None` for the
+    first ones.
+    """
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -274,5 +278,7 @@ class Diagnosis:
                 for name, one in self.rig.items()
             },
             "differing": None if self.differing is None else self.differing.to_json(),
+            "location": self.location
+            and dict(zip(("coordinate", "gap"), self.location)),
             "summary": self.summary,
         }

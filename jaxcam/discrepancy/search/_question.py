@@ -12,7 +12,7 @@ from ...fitting import Parameter, Problem, Sensor
 from ...recordings import Recording, RecordingError, References
 from ...recordings.cut import least_noise, Segments
 from ..policy import Policy
-from ..terms import SensorTerm, Term, Where
+from ..terms import Location, SensorTerm, Term, Where
 
 
 Report = Callable[[str, float | None], None]
@@ -38,6 +38,7 @@ class Question:
         `drive_noise`.
     - `shown`: parameters that are reported in another form.
     - `noisier`: channels with more noise than stated.
+    - `location`: coordinate and gap on which missing physics acts.
     """
 
     problem: Problem
@@ -52,6 +53,7 @@ class Question:
     drive_channel: str = "cam_angle_rad"
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
     noisier: tuple["Noisier", ...] = ()
+    location: Location = Location()
 
 
 class Noisier(NamedTuple):

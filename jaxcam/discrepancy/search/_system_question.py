@@ -20,7 +20,15 @@ from ...recordings.cut import (
 )
 from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
-from ..terms import coordinates, library, system_with_terms, Term, terms_of, watched
+from ..terms import (
+    coordinates,
+    library,
+    Location,
+    system_with_terms,
+    Term,
+    terms_of,
+    watched,
+)
 from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
 from ._question import (
@@ -44,6 +52,7 @@ def setup_question(
     candidates: Sequence[Term] | None,
     report: Report,
     policy: Policy,
+    location: Location = Location(),
 ) -> Question:
     """Return the problem of a rig with any system; the setup contains sensors and
     tolerances.
@@ -67,6 +76,7 @@ def setup_question(
         policy,
         setup.references,
         setup.drive_channel,
+        location,
     )
 
 
@@ -81,12 +91,13 @@ def system_question(
     policy: Policy,
     stated: Mapping[str, float] | None = None,
     drive_channel: str | None = None,
+    location: Location = Location(),
 ) -> Question:
-    """Return the problem of any system; terms act on its first coordinate and first
-    gap.
+    """Return the problem of any system; terms of the library act on the coordinate and
+    the gap of a `location`.
 
     **Arguments:** as for `diagnose`; the `stated` constants of the forms, by name; the
-    channel of a rotating drive, which is searched for ripple.
+    channel of a rotating drive, which is searched for ripple; the location.
 
     **Raises:** `ValueError` for recordings that are not segmented, or without sensors.
     """
@@ -103,16 +114,22 @@ def system_question(
             )
     runs = [part.recording for part in recordings]
     sensors, noisier = with_seen_noise(sensors, runs, policy)
-    pairs = coordinates(system, usual_state(system, sensors, runs))
+    pairs = location.first(coordinates(system, usual_state(system, sensors, runs)))
     seen = channel_of(sensors, pairs[0][0])
+    if location.coordinate and stated:
+        # the centre of a spring is that of the first coordinate
+        stated = {k: v for k, v in stated.items() if k != "spring_center"}
     unit, turned = unit_of(seen), system.period is not None
     usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))
     clocked = turned or drive is not None
 
     def listed(references: References):
-        usual = library(turned, references, clocked=clocked)
-        offered = usual if candidates is None else candidates
+        if candidates is None:
+            usual = library(turned, references, clocked=clocked)
+            offered = [location.of_library(term) for term in usual]
+        else:
+            offered = [location.reordered(term, len(pairs)) for term in candidates]
         scales = motion_scales(runs, seen, sensors[seen], references.slip_speed)
         scaled = [term.scaled(scales) for term in offered]
         return by_listing(measured_in(unit, scaled))
@@ -140,6 +157,7 @@ def system_question(
         unit,
         references,
         noisier=noisier,
+        location=location,
         **_drives(recordings, drive_channel),
     )
 

@@ -49,6 +49,8 @@ class Family:
     - `motion_unit`: unit of the coordinate.
     - `stride`: change of the argument of a force in an integration step where it is
         fast.
+    - `constraint`: index of the gap to which an effect at impacts or of the surface
+        belongs.
     """
 
     where: Where
@@ -60,6 +62,7 @@ class Family:
     slip: float = 0.01
     motion_unit: str = "rad"
     stride: float = 0.0
+    constraint: int = 0
 
     @property
     def name(self) -> str:
@@ -159,6 +162,7 @@ def families(
     slip: float,
     motion_unit: str,
     strides: Mapping[Variable, float],
+    constraint: int = 0,
 ) -> tuple[Family, ...]:
     """Return all families over the ranges that the recordings visit.
 
@@ -186,6 +190,7 @@ def families(
             motion_unit,
             # other functions are not integrated
             strides.get(argument, 0.0) if where is Where.FLIGHT else 0.0,
+            constraint,
         )
 
     phase = (Variable.PHASE,) if turned else ()

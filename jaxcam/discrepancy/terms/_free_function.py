@@ -218,6 +218,7 @@ class FreeFunction(Term):
             periodic=jnp.asarray(family.periodic),
             jumping=jnp.asarray(float(family.jumps)),
             motion_unit=family.motion_unit,
+            constraint=family.constraint,
             form=0.0 if primitive is None else 1.0 + PRIMITIVES.index(primitive),
             odd=float(primitive is not None and primitive.odd),
         )

@@ -1,0 +1,60 @@
+"""Seek missing physics at other coordinates and gaps than the first."""
+
+import dataclasses
+from collections.abc import Callable
+
+from .evidence import above_noise
+from .report import Diagnosis, Verdict
+from .terms import Location, other_locations, WithTerms
+
+
+def falls_short(found: Diagnosis) -> bool:
+    """Return whether a diagnosis leaves a residual above the noise unexplained."""
+    separate = found.differing
+    if found.verdict is Verdict.NONE or (separate is not None and separate.complete):
+        return False
+    samples = found.after.problem.samples
+    return above_noise(found.after.cost, samples, found.policy)
+
+
+def _left(found: Diagnosis) -> float:
+    """Return the cost above that of the noise."""
+    return max(found.after.cost - found.after.problem.samples, 0.0)
+
+
+def locations_of(found: Diagnosis) -> list[Location]:
+    """Return the other locations of the rig of a diagnosis."""
+    model = found.after.problem.model
+    system = model.system
+    assert isinstance(system, WithTerms)
+    return other_locations(system.base, system.coordinates, model.sensors)
+
+
+def sought_elsewhere(
+    found: Diagnosis, asked: Callable[[Location], Diagnosis]
+) -> Diagnosis:
+    """Return the diagnosis at the location where the missing physics is predicted best.
+
+    **Arguments:** the diagnosis at the first coordinate and gap, which falls short; and
+    a function that diagnoses at another location.
+    """
+    system = found.after.problem.model.system
+    assert isinstance(system, WithTerms)
+    best, where = found, Location()
+    for location in locations_of(found)[: found.policy.followed]:
+        other = asked(location)
+        if _left(other) < found.policy.elsewhere * _left(best):
+            best, where = other, location
+        if not falls_short(best):
+            break
+    if where == Location():
+        return found
+    first, then = (one.said(system, system.coordinates) for one in (Location(), where))
+    kind, k = ("coordinate", 0) if where.coordinate else ("gap", 1)
+    sentence = (
+        f"This was sought at the {kind} {then[k]}, because nothing at {first[k]} "
+        "explains the recordings as well."
+    )
+    return dataclasses.replace(
+        best, summary=f"{best.summary} {sentence}", location=then
+    )

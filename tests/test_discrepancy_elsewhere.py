@@ -1,0 +1,170 @@
+"""Missing physics at other coordinates and gaps than the first."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_discrepancy_coordinates import Pair, PAIRS, Push, Softer
+
+from jaxcam import HybridSystem
+from jaxcam.discrepancy import diagnose, library, Policy, Verdict
+from jaxcam.discrepancy._elsewhere import sought_elsewhere
+from jaxcam.discrepancy.report import Diagnosis
+from jaxcam.discrepancy.terms import Location, other_locations, WithTerms
+from jaxcam.fitting import Parameter, Sensor
+from jaxcam.recordings import Recording, segment
+
+
+SENSORS = {"one_m": Sensor(0, noise=1e-5), "two_m": Sensor(2, noise=1e-5)}
+
+
+def test_the_other_locations_are_measured_coordinates_and_gaps():
+    """Two masses, a wall and their contact; a velocity is no position."""
+    both = other_locations(Pair(), PAIRS, SENSORS)
+    assert both == [Location(1, 0), Location(0, 1)]
+    one = {"one_m": SENSORS["one_m"], "rate_m_s": Sensor(3, noise=1e-3)}
+    assert other_locations(Pair(), PAIRS, one) == [Location(0, 1)]
+
+
+def test_a_location_has_its_coordinate_first_and_own_terms_keep_theirs():
+    """A term of one's own acts on the same coordinate and gap in any order."""
+    state, time = jnp.array([0.2, 1.5, 0.9, -0.5]), jnp.asarray(0.3)
+    at = Location(coordinate=1)
+    pairs = at.first(PAIRS)
+    assert pairs == (PAIRS[1], PAIRS[0])
+    for place in (0, 1):
+        push = Push(0.5, coordinate=place)
+        usual = WithTerms(Pair(), (push,), PAIRS)
+        other = WithTerms(Pair(), (at.reordered(push, 2),), pairs)
+        np.testing.assert_array_equal(
+            usual.vector_field(time, state), other.vector_field(time, state)
+        )
+
+
+def test_library_terms_act_at_the_gap_of_a_location():
+    """The restitution between the masses falls, that of the wall does not."""
+    at = Location(constraint=1)
+    assert all(at.of_library(term).constraint == 1 for term in library())
+    softer = at.of_library(Softer(0.5))
+    state = jnp.array([0.2, 1.5, 0.2, -0.5])
+    system = WithTerms(Pair(), (softer,), PAIRS)
+    wall, joint = system.impact(0.3, state)
+    np.testing.assert_array_equal(wall, Pair().impact(0.3, state)[0])
+    assert float(joint[3] - joint[1]) == pytest.approx(0.6 * 0.5 * 2.0, rel=1e-12)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Found:
+    """What the choice of a location needs of a diagnosis."""
+
+    cost: float
+    verdict: Verdict = Verdict.UNKNOWN
+    policy: Policy = Policy()
+    summary: str = "An effect is missing."
+    location: tuple[str, str] | None = None
+    differing: None = None
+
+    @property
+    def after(self):
+        model = SimpleNamespace(system=WithTerms(Pair(), (), PAIRS), sensors=SENSORS)
+        return SimpleNamespace(
+            cost=self.cost, problem=SimpleNamespace(samples=1000, model=model)
+        )
+
+
+@pytest.mark.parametrize(
+    ("costs", "chosen", "asked"),
+    [
+        # the second coordinate explains everything: the gap is not tried
+        ((1000.0, 1000.0), ("x2", "1"), 1),
+        ((4000.0, 1500.0), ("x1", "2"), 2),
+        # a little less than the first: not worth another place
+        ((4000.0, 4500.0), None, 2),
+    ],
+)
+def test_the_location_that_explains_clearly_more_is_chosen(
+    costs, chosen, asked, unchecked_types
+):
+    given = dict(zip((Location(1, 0), Location(0, 1)), costs))
+    tried = []
+
+    def ask(location):
+        tried.append(location)
+        return _Found(given[location])
+
+    found = sought_elsewhere(_Found(5000.0), ask)  # pyright: ignore
+    assert found.location == chosen
+    assert len(tried) == asked
+    assert ("This was sought at" in found.summary) == (chosen is not None)
+
+
+class Two(HybridSystem):
+    """Two oscillators, coupled by a weak spring, far from any stop."""
+
+    state_names = ("left", "left_rate", "right", "right_rate")
+    stiffness: float = 150.0
+    coupling: float = 20.0
+    damping: float = 0.1
+
+    def vector_field(self, t, state):
+        x, v, y, w = state
+        pull = self.coupling * (x - y)
+        return jnp.stack(
+            [
+                v,
+                -self.stiffness * x - self.damping * v - pull,
+                w,
+                -self.stiffness * y - self.damping * w + pull,
+            ]
+        )
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state * jnp.array([1.0, -0.5, 1.0, 1.0])
+
+
+def _recorded(start, seed: int) -> Recording:
+    """The two oscillators, the second with dry friction, by the method of Heun."""
+    rng, h = np.random.default_rng(seed), 2e-5
+    state, rows = np.array(start), []
+
+    def field(s):
+        x, v, y, w = s
+        pull = 20.0 * (x - y)
+        rub = 0.4 * np.tanh(w / 1e-3)
+        return np.array(
+            [v, -150 * x - 0.1 * v - pull, w, -150 * y - 0.1 * w + pull - rub]
+        )
+
+    for k in range(125_000):
+        if k % 50 == 0:
+            rows.append(state[[0, 2]])
+        slope = field(state)
+        state = state + h / 2 * (slope + field(state + h * slope))
+    seen = np.array(rows) + 1e-5 * rng.standard_normal((len(rows), 2))
+    time = 1e-3 * np.arange(len(rows))
+    return Recording(f"run{seed}", time, {"one_m": seen[:, 0], "two_m": seen[:, 1]})
+
+
+@pytest.mark.slow
+def test_friction_on_the_second_coordinate_is_found_there():
+    """Its force to 2 %, and the sentence says where it was sought."""
+    runs = [
+        segment(_recorded(start, k), "one_m", noise=1e-5)
+        for k, start in enumerate(([0.2, 0, 0.15, 0], [0.1, 0, -0.2, 0]))
+    ]
+    parameters = [
+        Parameter("stiffness", lambda m: m.system.stiffness, 3.0, unit="1/s^2"),
+        Parameter("coupling", lambda m: m.system.coupling, 1.0, unit="1/s^2"),
+        Parameter("damping", lambda m: m.system.damping, 0.05, unit="1/s"),
+    ]
+    found: Diagnosis = diagnose(Two(), runs, sensors=SENSORS, parameters=parameters)
+    assert found.location == ("right", "1")
+    assert found.names == ("coulomb_friction",)
+    (strength,) = found.effects[0].parameters.values()
+    assert strength.value == pytest.approx(0.4, rel=0.02)
+    assert "sought at the coordinate right" in found.summary
