@@ -30,7 +30,8 @@ class Maker(NamedTuple):
     - `gaps(p, x)`, and `impacts`, one impact law `(p, x)` for each gap.
     - `start`: initial state; `speeds` (rad/s): smallest and largest, for a driven rig.
     - `channels`: name of each channel, and the state component that it measures.
-    - `restitution`: the parameter of the impact law of the first gap.
+    - `restitution`: the parameter of the impact law of the first gap; `second`: that of
+        the second gap, if it is an impact of the first coordinate as well.
     """
 
     field: Callable
@@ -40,6 +41,16 @@ class Maker(NamedTuple):
     channels: dict[str, int]
     speeds: tuple[float, float] | None = None
     restitution: str = ""
+    second: str = ""
+
+    def at_second_gap(self) -> "Maker":
+        """The same rig, with hidden effects at its second gap instead of the first."""
+        return self._replace(
+            gaps=lambda p, x: self.gaps(p, x)[::-1],
+            impacts=self.impacts[::-1],
+            restitution=self.second,
+            second=self.restitution,
+        )
 
 
 class Accumulates(Exception):
@@ -97,6 +108,7 @@ MAKERS = {
         {"position_m": 0},
         (8.0, 17.0),
         "restitution_left",
+        "restitution_right",
     ),
     "pendulum_wall": Maker(
         _pendulum,

@@ -10,6 +10,7 @@ parameters can represent.
 
     python -m benchmarks.unnamed two_stops
     python -m benchmarks.unnamed pendulum_wall --effects stop magnet --first 5
+    python -m benchmarks.unnamed two_stops --effects wear soft_side --second-gap
 """
 
 import argparse
@@ -171,7 +172,16 @@ def main() -> None:
         default=Policy().elements,
         help="`Policy.elements` of the diagnosis",
     )
+    parser.add_argument(
+        "--second-gap",
+        action="store_true",
+        help="let effects at impacts act at the second gap (two_stops)",
+    )
     args = parser.parse_args()
+    if args.second_gap:
+        if not MAKERS[args.rig].second:
+            parser.error(f"{args.rig} has no second gap of its first coordinate")
+        MAKERS[args.rig] = MAKERS[args.rig].at_second_gap()
     policy = Policy(elements=args.elements)
     setup = read_setup(RIGS / f"{args.rig}.toml")
     maker, count, right = MAKERS[args.rig], 0, 0

@@ -3,6 +3,7 @@
 import dataclasses
 from types import SimpleNamespace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -12,8 +13,17 @@ from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
 from jaxcam.discrepancy._elsewhere import sought_elsewhere
 from jaxcam.discrepancy.report import Diagnosis
-from jaxcam.discrepancy.terms import Location, other_locations, WithTerms
-from jaxcam.fitting import Parameter, Sensor
+from jaxcam.discrepancy.search._roughness import Roughness
+from jaxcam.discrepancy.search._slots import filled, Free, roomy, slots_of
+from jaxcam.discrepancy.terms import (
+    Family,
+    Location,
+    other_locations,
+    Variable,
+    Where,
+    WithTerms,
+)
+from jaxcam.fitting import Model, Parameter, Problem, Sensor
 from jaxcam.recordings import Recording, segment
 
 
@@ -53,6 +63,32 @@ def test_library_terms_act_at_the_gap_of_a_location():
     wall, joint = system.impact(0.3, state)
     np.testing.assert_array_equal(wall, Pair().impact(0.3, state)[0])
     assert float(joint[3] - joint[1]) == pytest.approx(0.6 * 0.5 * 2.0, rel=1e-12)
+
+
+def test_each_gap_has_a_slot_of_its_own():
+    """A function at one gap changes the impacts there only."""
+    time = 1e-3 * np.arange(400)
+    noise = 1e-5 * np.random.default_rng(1).standard_normal((2, len(time)))
+    seen = {"one_m": 0.2 + 1.5 * time + noise[0], "two_m": 3.0 - 0.5 * time + noise[1]}
+    run = segment(Recording("run", time, seen), "one_m", noise=1e-5)
+    model = Model(WithTerms(Pair(), (), PAIRS), SENSORS)
+    problem = Problem.build(model, [run], [])
+    family = Family(Where.IMPACT, Variable.APPROACH, 0.0, 4.0)
+    room = roomy(problem, family, 2, None)
+    state = jnp.array([0.2, 1.5, 0.2, -0.5])
+    before = room.model.system.impact(0.3, state)
+    for gap in (0, 1):
+        (slot,) = slots_of(room, Where.IMPACT, gap)
+        there = dataclasses.replace(family, constraint=gap)
+        put = filled(room, [Free(there, Roughness(), slot)])
+        place = [t.label for t in put.model.system.terms].index(slot)
+        term = put.model.system.terms[place]
+        numbers = tuple(jnp.asarray(0.3) for _ in term.coefficients)
+        moved = eqx.tree_at(lambda t: t.coefficients, term, numbers)
+        system = eqx.tree_at(lambda s: s.terms[place], put.model.system, moved)
+        after = system.impact(0.3, state)
+        assert not np.allclose(after[gap], before[gap])
+        np.testing.assert_array_equal(after[1 - gap], before[1 - gap])
 
 
 @dataclasses.dataclass(frozen=True)

@@ -210,7 +210,7 @@ def test_only_forces_are_averaged_over_an_integration_step():
     """The velocity of a surface is a derivative: averaged, it would be another one."""
     found = families(
         (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
-        turned=True, impacting=True, slip=0.01, motion_unit="m",
+        turned=True, gaps=2, slip=0.01, motion_unit="m",
         strides={Variable.TIME: 0.1, Variable.POSITION: 0.2},
     )  # fmt: skip
     forces = [one for one in found if one.where is Where.FLIGHT]
@@ -231,14 +231,22 @@ def test_a_table_has_several_points_in_a_jump():
 def test_families_have_one_place_each_and_different_names():
     both = families(
         (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
-        turned=True, impacting=True, slip=0.01, motion_unit="m", strides={},
+        turned=True, gaps=2, slip=0.01, motion_unit="m", strides={},
     )  # fmt: skip
     names = [one.name for one in both]
     assert len(set(names)) == len(names)
     assert {one.where for one in both} == set(Where) - {Where.DRIVE}
+    # each gap has its own restitution and surface
+    by_gap = [[one for one in both if one.constraint == gap] for gap in (0, 1)]
+    assert {one.where for one in by_gap[1]} == {Where.IMPACT, Where.CONTACT}
+    for where in (Where.IMPACT, Where.CONTACT):
+        first, second = (
+            [one.arguments for one in gap if one.where is where] for gap in by_gap
+        )
+        assert first == second
     free = families(
         (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
-        turned=False, impacting=False, slip=0.01, motion_unit="m", strides={},
+        turned=False, gaps=0, slip=0.01, motion_unit="m", strides={},
     )  # fmt: skip
     assert {one.where for one in free} == {Where.FLIGHT, Where.SENSOR}
     assert all(one.argument is not Variable.PHASE for one in free)

@@ -41,9 +41,9 @@ def diagnose(
     """Diagnose from recordings which physics a model lacks.
 
     A diagnosis takes minutes; the notebooks contain an example. Terms of the library
-    and functions act on the first coordinate and the first gap. Only if they leave a
-    residual above the noise are they sought at the other ones as well, which takes as
-    long again for each.
+    and forces act on the first coordinate and the first gap, functions at impacts at
+    the first two gaps. Only if they leave a residual above the noise are they sought at
+    other coordinates and gaps as well, which takes as long again for each.
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import NamedTuple
 
-from ...fitting import Fit
+from ...fitting import Fit, Problem
 from ..policy import Policy
 from ..search import (
     FreeSearch,
@@ -14,7 +14,7 @@ from ..search import (
     Trials,
     within_tolerances,
 )
-from ..terms import families
+from ..terms import families, gaps_of
 from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
 from ._differing import Differing, differing
 from ._held_out import held_out, HeldOut
@@ -112,16 +112,10 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     left = [one for one in left_after if one.significant]
     different = differing(best.fit, trials.policy)
     settled = _settled(different, left, best.bic, trials.policy)
+    without = different
     if left and best.names and not settled:
         without = differing(before.fit, trials.policy)
-        if _settled(without, left_before, best.bic, trials.policy):
-            # the terms only imitated the differences
-            different, settled = without, True
-            best, left_after, held = before, left_before, None
-            inclusion, deviation = redrawn(trials, best, seed)
-            needed, beyond = [], []
-    if settled:
-        doubtful = []
+        settled = _settled(without, left_before, best.bic, trials.policy)
     if left and trials.policy.functions and not settled:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed
@@ -129,6 +123,16 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     if missing is not None and different is not None:
         if different.complete and different.bic < missing.score:
             missing, needed_parts, others = None, None, ()
+    if missing is None and left and _explains(without, best.bic):
+        # no function common to the recordings explains as much
+        settled = True
+    if settled:
+        doubtful = []
+        if best.names and without is not different:
+            # the terms only imitated the differences
+            different, best, left_after, held = without, before, left_before, None
+            inclusion, deviation = redrawn(trials, best, seed)
+            needed, beyond = [], []
     after = best.fit if missing is None else missing.fit
     if after is not before.fit:
         # the parameters of the textbook model are within their tolerances
@@ -166,10 +170,15 @@ def _settled(
     """Return whether separate values of a parameter leave only noise, have a smaller
     BIC than the named terms, and no function common to the recordings promises as much.
     """
-    if different is None or not different.complete or different.bic >= bic:
+    if different is None or not _explains(different, bic):
         return False
     common = [one.gain for one in left if one.significant]
     return max(common, default=0.0) < policy.as_much * different.gained
+
+
+def _explains(different: Differing | None, bic: float) -> bool:
+    """Return whether separate values leave only noise and have a smaller BIC."""
+    return different is not None and different.complete and different.bic < bic
 
 
 def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:
@@ -220,11 +229,10 @@ def _without_a_name(
         approach,
         duration,
         turned=question.turned,
-        impacting=any(len(part.impacts.approach) for part in problem.segments),
+        gaps=_gaps_with_impacts(problem, policy),
         slip=question.references.slip_speed,
         motion_unit=question.unit,
         strides=visited.strides,
-        constraint=question.location.constraint,
     )
 
     def searched(elements: bool, policy: Policy = policy):
@@ -256,6 +264,13 @@ def _without_a_name(
     chosen, its_needs = min(kept, key=lambda each: each[0].score)
     tried = [one for search, _, _ in results for one in search.tried]
     return chosen, its_needs, rivals(chosen, tried, policy, seed)
+
+
+def _gaps_with_impacts(problem: Problem, policy: Policy) -> int:
+    """Return at how many gaps functions are sought: none without impacts."""
+    if not any(len(part.impacts.approach) for part in problem.segments):
+        return 0
+    return min(gaps_of(problem.model.system), policy.functions)
 
 
 def _needed(

@@ -16,6 +16,7 @@ from ..terms import (
     Factor,
     Family,
     FreeFunction,
+    gaps_of,
     HiddenElement,
     Resonator,
     terms_of,
@@ -63,6 +64,8 @@ class MissingFunction:
     - `formula`: the formula of the value, if a parametric form explains as much.
     - `element`: for a force with an internal state, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
+    - `gap`: for an effect at impacts or of the surface, the name of the gap if there
+        are several.
     """
 
     kind: str
@@ -76,6 +79,7 @@ class MissingFunction:
     formula: str | None = None
     element: HiddenElement | None = None
     numbers: tuple[str, ...] = ()
+    gap: str = ""
 
     @property
     def slot(self) -> str:
@@ -91,6 +95,7 @@ class MissingFunction:
             "table": table,
             "unit": self.unit,
             "formula": self.formula,
+            "gap": self.gap or None,
             "words": self.words,
             "records": list(self.records),
         }
@@ -151,6 +156,7 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
     if kind == "restitution":
         value, error = np.exp(value), np.exp(value) * error
     grid: tuple[np.ndarray, ...] = (along,)
+    gap = _gap_name(found, family)
     if len(arguments) == 2:
         ends = positions if family.factor is Factor.DEFLECTION else velocities
         factor_at = {
@@ -168,11 +174,20 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
         value,
         error,
         _unit(family),
-        words,
+        f"{words} (at {gap})" if gap else words,
         found.problem.records,
         formula,
         numbers=tuple(one.coefficients),
+        gap=gap,
     )
+
+
+def _gap_name(found: Fit, family: Family) -> str:
+    """Return the name of the gap to which a function belongs, if there are several."""
+    system = found.problem.model.system
+    if family.where not in (Where.IMPACT, Where.CONTACT) or gaps_of(system) < 2:
+        return ""
+    return system.constraint_name(family.constraint)
 
 
 def _graded(even: np.ndarray, function) -> np.ndarray:

@@ -62,12 +62,13 @@ class FreeSearch:
         self.tried: list[Missing] = []
         # candidates for the first function
         self.first: list[Lead] | None = None
-        impacting = any(family.where is not Where.FLIGHT for family in families)
+        struck = [f.constraint for f in families if f.where is Where.IMPACT]
+        gaps = 1 + max(struck, default=-1)
         unit = self.families[0].motion_unit
         driven = driven_by(problem, unit) if elements or policy.elements else None
         room, left = (driven, None) if elements else (None, driven)
         self.need = ElementNeed(self.fits, left, policy)
-        self.problem = roomy(problem, self.families[0], impacting, room)
+        self.problem = roomy(problem, self.families[0], gaps, room)
         # gain, offset and lag of a sensor are not unnamed functions
         faults = own_faults(self.problem.model, self.problem.parameters)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)

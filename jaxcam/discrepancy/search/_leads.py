@@ -76,12 +76,14 @@ class Leads:
         ]
         return sorted(leads, key=lambda lead: -lead.gain)
 
-    def _slot(self, problem: Problem, found: Missing, where: Where) -> str | None:
+    def _slot(
+        self, problem: Problem, found: Missing, where: Where, gap: int = 0
+    ) -> str | None:
         """Return a free slot for one more function, if there is one."""
         used = {one.slot for one in found.functions}
         if len(used) >= self.policy.functions:
             return None
-        return next((s for s in slots_of(problem, where) if s not in used), None)
+        return next((s for s in slots_of(problem, where, gap) if s not in used), None)
 
     def _in_flight(self, problem: Problem, found: Missing) -> Iterator[Lead]:
         slot = self._slot(problem, found, Where.FLIGHT)
@@ -154,7 +156,7 @@ class Leads:
         # impacts contain no information if they do not connect the pieces
         places = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
         for family in self.families:
-            slot = self._slot(problem, found, family.where)
+            slot = self._slot(problem, found, family.where, family.constraint)
             if family.where not in places or slot is None:
                 continue
             one = Free(family, Roughness(), slot)

@@ -36,7 +36,8 @@ _SUBSTEPS = 8
 # Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
 _ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
-_ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution_a"), (Where.CONTACT, "surface_a"))
+# for each gap, with its number
+_ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution"), (Where.CONTACT, "surface"))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,20 +100,29 @@ Part: TypeAlias = Free | Hidden
 
 
 def roomy(
-    problem: Problem, family: Family, impacting: bool, driven: Driven | None
+    problem: Problem, family: Family, gaps: int, driven: Driven | None
 ) -> Problem:
     """Return the problem with slots for free functions and a hidden element, all
     without effect, and with the possible errors of any sensor.
 
     One compiled program serves all contents of the slots.
 
-    **Arguments:** any family, which fills the slots initially; the position that drives
-    a hidden element, if it is measured.
+    **Arguments:** any family, which fills the slots initially; the number of gaps at
+    which functions may act; the position that drives a hidden element, if it is
+    measured.
     """
-    room = (*_ROOM, *(_ROOM_OF_IMPACTS if impacting else ()), *_ROOM_OF_SENSOR)
+    room = [(where, label, 0) for where, label in (*_ROOM, *_ROOM_OF_SENSOR)]
+    for gap in range(gaps):
+        room += [
+            (where, f"{label}_{gap + 1}", gap) for where, label in _ROOM_OF_IMPACTS
+        ]
     empty: list[Term] = [
-        FREE[where].of(family, label, [0.0] * (_SINES[where] + 1))
-        for where, label in room
+        FREE[where].of(
+            dataclasses.replace(family, constraint=gap),
+            label,
+            [0.0] * (_SINES[where] + 1),
+        )
+        for where, label, gap in room
     ]
     if driven is not None:
         empty.append(HiddenForce.empty(*driven.position.shape))
@@ -128,12 +138,16 @@ def _with_splines(model: Model) -> Model:
     return eqx.tree_at(terms_of, model, terms)
 
 
-def slots_of(problem: Problem, where: Where) -> list[str]:
-    """Return the labels of the slots for functions that act at a given place."""
+def slots_of(problem: Problem, where: Where, gap: int = 0) -> list[str]:
+    """Return the labels of the slots for functions that act at a given place, and at a
+    given gap.
+    """
     return [
         term.label
         for term in terms_of(problem.model)
-        if isinstance(term, FreeFunction) and where in term.acts
+        if isinstance(term, FreeFunction)
+        and where in term.acts
+        and term.constraint == gap
     ]
 
 

@@ -30,7 +30,11 @@ from ._library import (
     library as library,
     saved_classes as saved_classes,
 )
-from ._location import Location as Location, other_locations as other_locations
+from ._location import (
+    gaps_of as gaps_of,
+    Location as Location,
+    other_locations as other_locations,
+)
 from ._motion_scales import MotionScales as MotionScales
 from ._primitives import Place as Place, Primitive as Primitive
 from ._scaled import ScaledTerm as ScaledTerm

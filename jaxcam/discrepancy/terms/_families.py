@@ -70,6 +70,8 @@ class Family:
         parts = [self.where, self.argument]
         if self.factor is not Factor.ONE:
             parts.append(self.factor)
+        if self.constraint:
+            parts.append(f"gap {self.constraint + 1}")
         return " ".join(parts)
 
     @property
@@ -158,17 +160,16 @@ def families(
     duration: float,
     *,
     turned: bool,
-    impacting: bool,
+    gaps: int,
     slip: float,
     motion_unit: str,
     strides: Mapping[Variable, float],
-    constraint: int = 0,
 ) -> tuple[Family, ...]:
     """Return all families over the ranges that the recordings visit.
 
     **Arguments:** smallest and largest position, velocity and approach speed, the
-    duration of the recordings (s), whether there is a drive with a phase and whether
-    there are impacts, the slip speed, the unit of the motion, and the changes of the
+    duration of the recordings (s), whether there is a drive with a phase, the number of
+    gaps with impacts, the slip speed, the unit of the motion, and the changes of the
     arguments in an integration step.
     """
     ranges = {
@@ -179,7 +180,12 @@ def families(
         Variable.PHASE: (0.0, 2 * math.pi),
     }
 
-    def one(where: Where, argument: Variable, factor: Factor = Factor.ONE) -> Family:
+    def one(
+        where: Where,
+        argument: Variable,
+        factor: Factor = Factor.ONE,
+        constraint: int = 0,
+    ) -> Family:
         return Family(
             where,
             argument,
@@ -200,12 +206,15 @@ def families(
         for factor in Factor
         if (argument, factor) not in _DOUBLED
     ]
-    if impacting:
+    for gap in range(gaps):
         found += [
-            one(Where.IMPACT, argument)
+            one(Where.IMPACT, argument, constraint=gap)
             for argument in (Variable.APPROACH, Variable.TIME, *phase)
         ]
-        found += [one(Where.CONTACT, argument) for argument in (Variable.TIME, *phase)]
+        found += [
+            one(Where.CONTACT, argument, constraint=gap)
+            for argument in (Variable.TIME, *phase)
+        ]
     found += [
         one(Where.SENSOR, argument) for argument in (*_TIMELESS, Variable.TIME, *phase)
     ]

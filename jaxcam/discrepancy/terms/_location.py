@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from ...fitting import Sensor
 from ...hybrid import HybridSystem
 from ._term import Term
+from ._with_terms import WithTerms
 
 
 class Location(NamedTuple):
@@ -60,12 +61,17 @@ def other_locations(
     first.
     """
     measured = {one.observe for one in sensors.values() if isinstance(one.observe, int)}
-    size = 1 + max(map(max, pairs))
-    state = jax.ShapeDtypeStruct((size,), jnp.float64)
-    gap = jax.eval_shape(system.gap, jax.ShapeDtypeStruct((), jnp.float64), state)
     found = [
         Location(coordinate=k)
         for k, (place, _) in enumerate(pairs)
         if k and place in measured
     ]
-    return found + [Location(constraint=c) for c in range(1, gap.size)]
+    number = gaps_of(WithTerms(system, (), pairs))
+    return found + [Location(constraint=c) for c in range(1, number)]
+
+
+def gaps_of(system) -> int:
+    """Return the number of gaps of a system with terms."""
+    state = jax.ShapeDtypeStruct((1 + max(map(max, system.coordinates)),), jnp.float64)
+    time = jax.ShapeDtypeStruct((), jnp.float64)
+    return jax.eval_shape(system.base.gap, time, state).size
