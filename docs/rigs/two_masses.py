@@ -10,6 +10,7 @@ class TwoMasses(HybridSystem):
 
     state_names = ("x1", "v1", "x2", "v2")
     state_units = ("m", "m/s", "m", "m/s")
+    constraint_names = ("wall", "other mass")
 
     k1_over_m1: float = 2500.0  # 1/s^2
     c1_over_m1: float = 2.0  # 1/s

@@ -10,6 +10,7 @@ class TwoStops(HybridSystem):
 
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
+    constraint_names = ("left stop", "right stop")
 
     stiffness_over_mass: float = 61.5  # 1/s^2
     damping_over_mass: float = 0.12  # 1/s

@@ -174,7 +174,7 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
         value,
         error,
         _unit(family),
-        f"{words} (at {gap})" if gap else words,
+        f"{words} (gap: {gap})" if gap else words,
         found.problem.records,
         formula,
         numbers=tuple(one.coefficients),
