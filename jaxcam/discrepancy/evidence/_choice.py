@@ -6,6 +6,7 @@ from typing import NamedTuple
 from ...fitting import Fit, Problem
 from ..policy import Policy
 from ..search import (
+    decoys_of,
     FreeSearch,
     Missing,
     Question,
@@ -290,7 +291,7 @@ def _needed(
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
         if needed.inclusion[least] >= policy.sure:
-            return found._replace(decoys=search.decoys(found)), needed
+            return found._replace(decoys=decoys_of(search.first or (), found)), needed
         if len(parts) < 2:
             break
         found = search.without(found, least)

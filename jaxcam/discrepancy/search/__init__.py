@@ -17,6 +17,7 @@ from ._gains import (
 from ._given_up import given_up as given_up
 from ._hidden_state import Hidden as Hidden
 from ._kept_trials import KeptTrials as KeptTrials
+from ._leads import decoys_of as decoys_of
 from ._local_force import force_blocks as force_blocks, Response as Response
 from ._named_terms import with_terms as with_terms
 from ._question import Question as Question, Report as Report

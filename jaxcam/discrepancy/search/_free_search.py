@@ -25,6 +25,7 @@ from ._hidden_leads import simplified
 from ._hidden_signals import driven_by
 from ._hidden_state import started
 from ._leads import Lead, Leads, shows_apart
+from ._recentre import recentred
 from ._slots import (
     emptied,
     filled,
@@ -95,9 +96,18 @@ class FreeSearch:
             found = self._grown(swapped, False)
         if not found.functions:
             return None
-        found = self._pruned(found)
+        whole = recentred(self.fits, found)
+        found = self._pruned(whole)
         found = simplified(self.fits, self.problem, found, self.progress)
         curve, found = found, self._formulated(found)
+        few = len(found.functions) < len(whole.functions)
+        if (
+            few
+            and leaves_noise(self.fits, whole)
+            and not leaves_noise(self.fits, found)
+        ):
+            # no form replaces the function that was left out
+            curve, found = whole, self._formulated(whole)
         if len(found.functions) > 1 or found.names:
             return found
         # a form may be a little worse than its curve: the better of both counts
@@ -158,15 +168,6 @@ class FreeSearch:
         if found is None:
             return True
         return not leaves_noise(self.fits, found, self._small(found))
-
-    def decoys(self, found: Missing) -> tuple[tuple[str, float], ...]:
-        """Return the labels of functions, and the fractions that their decoys gain."""
-        labels = {one.label for one in found.functions}
-        return tuple(
-            (lead.label, lead.decoy)
-            for lead in self.first or []
-            if lead.label in labels and lead.decoy is not None
-        )
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         return self.fits.fitted(

@@ -187,6 +187,16 @@ class Leads:
             yield Lead(grown / heat - price, term.name)
 
 
+def decoys_of(leads: Sequence[Lead], found: Missing) -> tuple[tuple[str, float], ...]:
+    """Return the labels of functions, and the fractions that their decoys gain."""
+    labels = {one.label for one in found.functions}
+    return tuple(
+        (lead.label, lead.decoy)
+        for lead in leads
+        if lead.label in labels and lead.decoy is not None
+    )
+
+
 def shows_apart(family: Family) -> bool:
     """Return whether disconnected pieces show a function."""
     drifts = family.where is Where.SENSOR and family.argument is Variable.TIME

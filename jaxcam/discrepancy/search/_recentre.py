@@ -1,0 +1,72 @@
+"""Merge a stiffness and a force of the same argument: the stiffness has another centre.
+
+`g(a) (q - c)` is `g(a) (q - m)` with an assumed centre m, and the force `(m - c) g(a)`.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from ..terms import Factor, free_basis
+from ._free_fits import FreeFits, Missing, Subset
+from ._slots import emptied, Free
+
+
+# Number of points at which the two functions are compared
+_GRID = 400
+# Number of times the centre is estimated
+_ROUNDS = 2
+
+
+def recentred(fits: FreeFits, found: Missing) -> Missing:
+    """Return the fit with one function instead of two, if it has more evidence."""
+    for one in found.functions:
+        other = _partner(found, one)
+        if other is None:
+            continue
+        both = found
+        for _ in range(_ROUNDS):
+            moved = _moved(both, one, other)
+            rest = tuple(f for f in both.functions if f.slot != one.slot)
+            subset = Subset(found.problem, (moved, *rest), found.names)
+            both = fits.fitted(subset, both.fit.point)
+            one = next(f for f in both.functions if f.slot == one.slot)
+        moved = _moved(both, one, other)
+        rest = tuple(f for f in both.functions if f.slot not in (one.slot, other.slot))
+        values = emptied(found.problem, both.fit.point.values, other.slot)
+        alone = fits.fitted(
+            Subset(found.problem, (moved, *rest), found.names),
+            both.fit.point._replace(values=values),
+        )
+        if alone.score < found.score:
+            return alone
+    return found
+
+
+def _partner(found: Missing, one) -> Free | None:
+    """Return the force of the same argument as a stiffness, if both are curves."""
+    if not _is_curve(one) or one.family.factor is not Factor.DEFLECTION:
+        return None
+    alike = dataclasses.replace(one.family, factor=Factor.ONE)
+    return next(
+        (f for f in found.functions if _is_curve(f) and f.family.name == alike.name),
+        None,
+    )
+
+
+def _is_curve(one) -> bool:
+    return isinstance(one, Free) and one.smooth
+
+
+def _moved(found: Missing, one: Free, other: Free) -> Free:
+    """Return the stiffness about the centre that the force suggests."""
+    stiffness, force = (_values(found, f) for f in (one, other))
+    shift = float(stiffness @ force) / max(float(stiffness @ stiffness), 1e-300)
+    family = dataclasses.replace(one.family, middle=one.family.middle - shift)
+    return dataclasses.replace(one, family=family)
+
+
+def _values(found: Missing, one: Free) -> np.ndarray:
+    along = np.linspace(one.family.low, one.family.high, _GRID)
+    basis = free_basis(one.family, along, len(one.coefficients))
+    return basis @ np.array([found.fit[name].value for name in one.coefficients])
