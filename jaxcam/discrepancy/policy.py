@@ -94,7 +94,7 @@ class Policy:
         0.9, "fraction of their gain above which a common function is sought"
     )
     near: float = _decides(
-        4.0, "cost per sample below which an unconverged fit counts as near the data"
+        4.0, "cost per sample below which a fit counts as near the data"
     )
     explains: float = _decides(
         0.5,

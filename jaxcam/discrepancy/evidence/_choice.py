@@ -214,14 +214,16 @@ def _without_a_name(
     """Return the functions that explain the residual of the named terms, chosen by
     their evidence.
 
-    A residual that is small compared with the part explained by a named term does not
-    count. A function that the bootstrap samples do not retain is not needed.
+    A residual near the noise that is small compared with the part explained by a named
+    term does not count, nor one that the smoothing of dry friction may leave. A
+    function that the bootstrap samples do not retain is not needed.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
-    small = policy.small * (bare - best.fit.cost)
-    if best.names and max(one.gain for one in left) < small:
-        return None, None, ()
     problem = question.problem
+    near = best.fit.cost < policy.near * problem.samples
+    small = policy.small if near else policy.corner_share
+    if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
+        return None, None, ()
     visited = visited_states(problem)
     positions, velocities, approach, duration = visited.ranges(policy)
     offered = families(
