@@ -97,7 +97,7 @@ def test_a_form_that_jumps_has_more_substeps():
     model = Model(WithTerms(Swing()), {"angle_rad": Sensor(0, noise=NOISE)})
     problem = Problem.build(model, [segment(run, "angle_rad", noise=NOISE)], [])
     family = Family(Where.FLIGHT, Variable.TIME, 0.0, 2.5)
-    room = roomy(problem, family, 0, None)
+    room = roomy(problem, family, (), None)
     before = np.asarray(room.pieces.substeps)
     assert np.all(before < 8)
     forms = {one.name: one for one in family.primitives}

@@ -13,10 +13,12 @@ from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
 from jaxcam.discrepancy._elsewhere import sought_elsewhere
 from jaxcam.discrepancy.report import Diagnosis
+from jaxcam.discrepancy.search import _slots
 from jaxcam.discrepancy.search._roughness import Roughness
-from jaxcam.discrepancy.search._slots import filled, Free, roomy, slots_of
+from jaxcam.discrepancy.search._slots import filled, roomy, slots_of
 from jaxcam.discrepancy.terms import (
     Family,
+    gaps_of,
     Location,
     other_locations,
     Variable,
@@ -30,12 +32,62 @@ from jaxcam.recordings import Recording, segment
 SENSORS = {"one_m": Sensor(0, noise=1e-5), "two_m": Sensor(2, noise=1e-5)}
 
 
-def test_the_other_locations_are_measured_coordinates_and_gaps():
+def _problem(system, sensors, states: int):
+    """What a location needs of a problem."""
+    pairs = PAIRS if states > 3 else PAIRS[:1]
+    model = SimpleNamespace(system=WithTerms(system, (), pairs), sensors=sensors)
+    start = SimpleNamespace(states=np.zeros((1, 2, states)))
+    return SimpleNamespace(model=model, start=start)
+
+
+class Warm(HybridSystem):
+    """A mass that falls onto a floor and has a temperature, the last of its states."""
+
+    def vector_field(self, t, state):
+        x, v, warmth = state
+        return jnp.stack([v, -9.81 - 0.1 * v, v * v - warmth])
+
+    def gap(self, t, state):
+        x, v, warmth = state
+        return x
+
+    def impact(self, t, state):
+        x, v, warmth = state
+        return jnp.stack([x, -0.5 * v, warmth])
+
+
+class Free(Warm):
+    """The same without a floor."""
+
+    def gap(self, t, state):
+        return jnp.zeros((0,))
+
+    def impact(self, t, state):
+        return jnp.zeros((0, 3))
+
+
+def test_the_other_locations_are_measured_coordinates_and_gaps(unchecked_types):
     """Two masses, a wall and their contact; a velocity is no position."""
-    both = other_locations(Pair(), PAIRS, SENSORS)
+    both = other_locations(_problem(Pair(), SENSORS, 4))  # pyright: ignore
     assert both == [Location(1, 0), Location(0, 1)]
     one = {"one_m": SENSORS["one_m"], "rate_m_s": Sensor(3, noise=1e-3)}
-    assert other_locations(Pair(), PAIRS, one) == [Location(0, 1)]
+    only = other_locations(_problem(Pair(), one, 4))  # pyright: ignore
+    assert only == [Location(0, 1)]
+
+
+def test_a_gap_is_evaluated_at_the_whole_state(unchecked_types):
+    """Also where the last component is no coordinate; a system may have no gap."""
+    sensors = {"one_m": SENSORS["one_m"]}
+    for system, gaps in ((Warm(), 1), (Free(), 0)):
+        problem = _problem(system, sensors, 3)
+        assert gaps_of(problem) == gaps  # pyright: ignore
+        assert other_locations(problem) == []  # pyright: ignore
+
+
+def test_a_coordinate_that_does_not_exist_is_refused():
+    with pytest.raises(ValueError, match="acts on coordinate 2, but the system has 2"):
+        Location().reordered(Push(0.5, coordinate=2), 2)
+    assert Location().reordered(Push(0.5, coordinate=-1), 2).coordinate == 1
 
 
 def test_a_location_has_its_coordinate_first_and_own_terms_keep_theirs():
@@ -74,13 +126,13 @@ def test_each_gap_has_a_slot_of_its_own():
     model = Model(WithTerms(Pair(), (), PAIRS), SENSORS)
     problem = Problem.build(model, [run], [])
     family = Family(Where.IMPACT, Variable.APPROACH, 0.0, 4.0)
-    room = roomy(problem, family, 2, None)
+    room = roomy(problem, family, (0, 1), None)
     state = jnp.array([0.2, 1.5, 0.2, -0.5])
     before = room.model.system.impact(0.3, state)
     for gap in (0, 1):
         (slot,) = slots_of(room, Where.IMPACT, gap)
         there = dataclasses.replace(family, constraint=gap)
-        put = filled(room, [Free(there, Roughness(), slot)])
+        put = filled(room, [_slots.Free(there, Roughness(), slot)])
         place = [t.label for t in put.model.system.terms].index(slot)
         term = put.model.system.terms[place]
         numbers = tuple(jnp.asarray(0.3) for _ in term.coefficients)
@@ -104,18 +156,17 @@ class _Found:
 
     @property
     def after(self):
-        model = SimpleNamespace(system=WithTerms(Pair(), (), PAIRS), sensors=SENSORS)
-        return SimpleNamespace(
-            cost=self.cost, problem=SimpleNamespace(samples=1000, model=model)
-        )
+        problem = _problem(Pair(), SENSORS, 4)
+        problem.samples = 1000
+        return SimpleNamespace(cost=self.cost, problem=problem)
 
 
 @pytest.mark.parametrize(
     ("costs", "chosen", "asked"),
     [
         # the second coordinate explains everything: the gap is not tried
-        ((1000.0, 1000.0), ("x2", "1"), 1),
-        ((4000.0, 1500.0), ("x1", "2"), 2),
+        ((1000.0, 1000.0), ("x2", "constraint 0"), 1),
+        ((4000.0, 1500.0), ("x1", "constraint 1"), 2),
         # a little less than the first: not worth another place
         ((4000.0, 4500.0), None, 2),
     ],
@@ -134,6 +185,19 @@ def test_the_location_that_explains_clearly_more_is_chosen(
     assert found.location == chosen
     assert len(tried) == asked
     assert ("This was sought at" in found.summary) == (chosen is not None)
+
+
+def test_terms_of_ones_own_are_not_moved_to_other_gaps(unchecked_types):
+    """They have a gap of their own: only the other coordinate is tried."""
+    tried = []
+
+    def ask(location):
+        tried.append(location)
+        return _Found(4900.0)
+
+    found = sought_elsewhere(_Found(5000.0), ask, library=False)  # pyright: ignore
+    assert tried == [Location(1, 0)]
+    assert found.location is None
 
 
 class Two(HybridSystem):
@@ -199,7 +263,7 @@ def test_friction_on_the_second_coordinate_is_found_there():
         Parameter("damping", lambda m: m.system.damping, 0.05, unit="1/s"),
     ]
     found: Diagnosis = diagnose(Two(), runs, sensors=SENSORS, parameters=parameters)
-    assert found.location == ("right", "1")
+    assert found.location == ("right", "constraint 0")
     assert found.names == ("coulomb_friction",)
     (strength,) = found.effects[0].parameters.values()
     assert strength.value == pytest.approx(0.4, rel=0.02)

@@ -119,6 +119,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_SETTLED",
         # rounds in which the centre of a stiffness is estimated
         "_ROUNDS",
+        "_ALIKE",
         # how Newton steps for states of held-out data are shortened
         "_SHORTER",
         "_SHORTEST",

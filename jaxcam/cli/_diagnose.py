@@ -105,7 +105,7 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
             "--resume: there is nothing to resume; give the folder of the interrupted "
             "diagnosis with --out, or leave --resume out to start again."
         )
-    if keep is not None and not resume and any(keep.glob("*.npz")):
+    if keep is not None and not resume and any(keep.rglob("*.npz")):
         raise ValueError(
             f"{keep} contains the fits of an interrupted diagnosis; add --resume to "
             "continue it, or give another folder with --out."

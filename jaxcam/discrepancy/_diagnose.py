@@ -1,5 +1,6 @@
 """Diagnose recordings: the verdict is "effect", "none" or "unknown"."""
 
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -93,11 +94,8 @@ def diagnose(
         return _answered(question, case, seed, report, folder, policy)
 
     def asked_at(location: Location) -> Diagnosis:
-        report(
-            f"seeking at coordinate {location.coordinate + 1}, gap "
-            f"{location.constraint + 1}",
-            None,
-        )
+        kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
+        report(f"seeking at the {kind} number {location[k] + 1}", None)
         name = "at_{}_{}".format(*location)
         return asked(recordings, None if keep is None else keep / name, location)
 
@@ -109,7 +107,9 @@ def diagnose(
         folder = None if keep is None else keep / "without_one"
         found = set_aside(found, asked(others, folder), odd)
     elif falls_short(found):
-        found = sought_elsewhere(found, asked_at)
+        found = sought_elsewhere(found, asked_at, candidates is None)
+    if keep is not None:
+        shutil.rmtree(keep, ignore_errors=True)
     return found
 
 
@@ -167,6 +167,4 @@ def _answered(
     )
     choice = choose(question, trials, seed)
     found = diagnosis_of(case, question, trials, choice, ripple)
-    if kept is not None:
-        kept.clear()
     return found

@@ -22,26 +22,21 @@ def _left(found: Diagnosis) -> float:
     return max(found.after.cost - found.after.problem.samples, 0.0)
 
 
-def locations_of(found: Diagnosis) -> list[Location]:
-    """Return the other locations of the rig of a diagnosis."""
-    model = found.after.problem.model
-    system = model.system
-    assert isinstance(system, WithTerms)
-    return other_locations(system.base, system.coordinates, model.sensors)
-
-
 def sought_elsewhere(
-    found: Diagnosis, asked: Callable[[Location], Diagnosis]
+    found: Diagnosis, asked: Callable[[Location], Diagnosis], library: bool = True
 ) -> Diagnosis:
-    """Return the diagnosis at the location where the missing physics is predicted best.
+    """Return the diagnosis at the location where the missing physics explains most.
 
-    **Arguments:** the diagnosis at the first coordinate and gap, which falls short; and
-    a function that diagnoses at another location.
+    **Arguments:** the diagnosis at the first coordinate and gap, which falls short; a
+    function that diagnoses at another location; and whether the terms are those of the
+    library, which act at any gap.
     """
-    system = found.after.problem.model.system
+    problem = found.after.problem
+    system = problem.model.system
     assert isinstance(system, WithTerms)
+    locations = [one for one in other_locations(problem) if one.coordinate or library]
     best, where = found, Location()
-    for location in locations_of(found)[: found.policy.followed]:
+    for location in locations[: found.policy.followed]:
         other = asked(location)
         if _left(other) < found.policy.elsewhere * _left(best):
             best, where = other, location

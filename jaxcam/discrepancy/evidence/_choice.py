@@ -3,7 +3,7 @@
 import dataclasses
 from typing import NamedTuple
 
-from ...fitting import Fit, Problem
+from ...fitting import Fit
 from ..policy import Policy
 from ..search import (
     decoys_of,
@@ -113,7 +113,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     left = [one for one in left_after if one.significant]
     different = differing(best.fit, trials.policy)
     settled = _settled(different, left, best.bic, trials.policy)
-    without = different
+    without = None
     if left and best.names and not settled:
         without = differing(before.fit, trials.policy)
         settled = _settled(without, left_before, best.bic, trials.policy)
@@ -121,15 +121,16 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed
         )
-    if missing is not None and different is not None:
-        if different.complete and different.bic < missing.score:
+    separate = [one for one in (different, without) if _explains(one, best.bic)]
+    if separate and left:
+        fewest = min(separate, key=lambda one: one.bic)
+        if missing is None or fewest.bic < missing.score:
+            # no function common to the recordings explains as much
             missing, needed_parts, others = None, None, ()
-    if missing is None and left and _explains(without, best.bic):
-        # no function common to the recordings explains as much
-        settled = True
+            settled = True
     if settled:
         doubtful = []
-        if best.names and without is not different:
+        if separate and fewest is without:
             # the terms only imitated the differences
             different, best, left_after, held = without, before, left_before, None
             inclusion, deviation = redrawn(trials, best, seed)
@@ -232,7 +233,7 @@ def _without_a_name(
         approach,
         duration,
         turned=question.turned,
-        gaps=_gaps_with_impacts(problem, policy),
+        gaps=_gaps_with_impacts(question, policy),
         slip=question.references.slip_speed,
         motion_unit=question.unit,
         strides=visited.strides,
@@ -269,11 +270,15 @@ def _without_a_name(
     return chosen, its_needs, rivals(chosen, tried, policy, seed)
 
 
-def _gaps_with_impacts(problem: Problem, policy: Policy) -> int:
-    """Return at how many gaps functions are sought: none without impacts."""
+def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:
+    """Return the gaps at which functions are sought: none without impacts, otherwise
+    the first ones and that of the location.
+    """
+    problem = question.problem
     if not any(len(part.impacts.approach) for part in problem.segments):
-        return 0
-    return min(gaps_of(problem.model.system), policy.functions)
+        return ()
+    first = range(min(gaps_of(problem), policy.functions))
+    return tuple(sorted({*first, question.location.constraint}))
 
 
 def _needed(

@@ -184,10 +184,10 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
 
 def _gap_name(found: Fit, family: Family) -> str:
     """Return the name of the gap to which a function belongs, if there are several."""
-    system = found.problem.model.system
-    if family.where not in (Where.IMPACT, Where.CONTACT) or gaps_of(system) < 2:
+    problem = found.problem
+    if family.where not in (Where.IMPACT, Where.CONTACT) or gaps_of(problem) < 2:
         return ""
-    return system.constraint_name(family.constraint)
+    return problem.model.system.constraint_name(family.constraint)
 
 
 def _graded(even: np.ndarray, function) -> np.ndarray:

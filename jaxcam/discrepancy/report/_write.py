@@ -16,7 +16,7 @@ from ..evidence import (
 )
 from ..policy import Policy
 from ..search import Missing, Question, Trials
-from ..terms import Value
+from ..terms import Value, watching
 from ._alternatives import (
     alternatives_of,
     alternatives_to_functions,
@@ -70,7 +70,8 @@ def diagnosis_of(
     ties = [trial for trial in others if abs(trial.bic - best.bic) < policy.tie]
     caveats += noisier_than_stated(question)
     caveats += caveats_of(trials, choice, ties, bool(effects))
-    floor = float(next(iter(question.problem.model.sensors.values())).floor)
+    model = question.problem.model
+    floor = float(model.sensors[watching(model)].floor)
     least = limits(trials, best)
     within = choice.before.fit
     names = [effect.name for effect in effects]
@@ -140,7 +141,8 @@ def _of_functions(
     effects = missing_effects(trials, functions, missing, needs, choice, divided)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
-    floor = float(next(iter(question.problem.model.sensors.values())).floor)
+    model = question.problem.model
+    floor = float(model.sensors[watching(model)].floor)
     within = bare.fit
     return Diagnosis(
         case,

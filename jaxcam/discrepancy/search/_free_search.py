@@ -63,8 +63,7 @@ class FreeSearch:
         self.tried: list[Missing] = []
         # candidates for the first function
         self.first: list[Lead] | None = None
-        struck = [f.constraint for f in families if f.where is Where.IMPACT]
-        gaps = 1 + max(struck, default=-1)
+        gaps = sorted({f.constraint for f in families if f.where is Where.IMPACT})
         unit = self.families[0].motion_unit
         driven = driven_by(problem, unit) if elements or policy.elements else None
         room, left = (driven, None) if elements else (None, driven)

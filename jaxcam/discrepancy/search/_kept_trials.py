@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import shutil
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -85,10 +84,6 @@ class KeptTrials:
                 iterations=np.array(ended.iterations),
             )
         os.replace(part, file)
-
-    def clear(self) -> None:
-        """Delete all files when the diagnosis is complete."""
-        shutil.rmtree(self.folder, ignore_errors=True)
 
     def _file(self, names: Iterable[str]) -> Path:
         return self.folder / f"{'+'.join(sorted(names)) or 'none'}.npz"

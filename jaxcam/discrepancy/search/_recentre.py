@@ -16,13 +16,15 @@ from ._slots import emptied, Free
 _GRID = 400
 # Number of times the centre is estimated
 _ROUNDS = 2
+# Correlation of the two functions above which they may be one
+_ALIKE = 0.9
 
 
 def recentred(fits: FreeFits, found: Missing) -> Missing:
     """Return the fit with one function instead of two, if it has more evidence."""
     for one in found.functions:
         other = _partner(found, one)
-        if other is None:
+        if other is None or not _proportional(found, one, other):
             continue
         both = found
         for _ in range(_ROUNDS):
@@ -52,6 +54,12 @@ def _partner(found: Missing, one) -> Free | None:
         (f for f in found.functions if _is_curve(f) and f.family.name == alike.name),
         None,
     )
+
+
+def _proportional(found: Missing, one: Free, other: Free) -> bool:
+    stiffness, force = (_values(found, f) for f in (one, other))
+    sizes = np.linalg.norm(stiffness) * np.linalg.norm(force)
+    return abs(float(stiffness @ force)) > _ALIKE * float(sizes)
 
 
 def _is_curve(one) -> bool:

@@ -100,19 +100,19 @@ Part: TypeAlias = Free | Hidden
 
 
 def roomy(
-    problem: Problem, family: Family, gaps: int, driven: Driven | None
+    problem: Problem, family: Family, gaps: Sequence[int], driven: Driven | None
 ) -> Problem:
     """Return the problem with slots for free functions and a hidden element, all
     without effect, and with the possible errors of any sensor.
 
     One compiled program serves all contents of the slots.
 
-    **Arguments:** any family, which fills the slots initially; the number of gaps at
-    which functions may act; the position that drives a hidden element, if it is
+    **Arguments:** any family, which fills the slots initially; the indices of the gaps
+    at which functions may act; the position that drives a hidden element, if it is
     measured.
     """
     room = [(where, label, 0) for where, label in (*_ROOM, *_ROOM_OF_SENSOR)]
-    for gap in range(gaps):
+    for gap in gaps:
         room += [
             (where, f"{label}_{gap + 1}", gap) for where, label in _ROOM_OF_IMPACTS
         ]

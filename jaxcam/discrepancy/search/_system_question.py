@@ -116,9 +116,8 @@ def system_question(
     sensors, noisier = with_seen_noise(sensors, runs, policy)
     pairs = location.first(coordinates(system, usual_state(system, sensors, runs)))
     seen = channel_of(sensors, pairs[0][0])
-    if location.coordinate and stated:
-        # the centre of a spring is that of the first coordinate
-        stated = {k: v for k, v in stated.items() if k != "spring_center"}
+    # the constants of a rig are those of its first coordinate
+    stated = {} if location.coordinate else stated
     unit, turned = unit_of(seen), system.period is not None
     usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))

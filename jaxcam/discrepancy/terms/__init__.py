@@ -57,6 +57,7 @@ from ._term import (
     strength as strength,
     Term as Term,
     terms_of as terms_of,
+    watching as watching,
 )
 from ._value import Value as Value
 from ._where import Where as Where

@@ -3,7 +3,7 @@
 import dataclasses
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -160,7 +160,7 @@ def families(
     duration: float,
     *,
     turned: bool,
-    gaps: int,
+    gaps: Sequence[int],
     slip: float,
     motion_unit: str,
     strides: Mapping[Variable, float],
@@ -168,9 +168,9 @@ def families(
     """Return all families over the ranges that the recordings visit.
 
     **Arguments:** smallest and largest position, velocity and approach speed, the
-    duration of the recordings (s), whether there is a drive with a phase, the number of
-    gaps with impacts, the slip speed, the unit of the motion, and the changes of the
-    arguments in an integration step.
+    duration of the recordings (s), whether there is a drive with a phase, the indices
+    of the gaps with impacts, the slip speed, the unit of the motion, and the changes of
+    the arguments in an integration step.
     """
     ranges = {
         Variable.POSITION: positions,
@@ -206,7 +206,7 @@ def families(
         for factor in Factor
         if (argument, factor) not in _DOUBLED
     ]
-    for gap in range(gaps):
+    for gap in gaps:
         found += [
             one(Where.IMPACT, argument, constraint=gap)
             for argument in (Variable.APPROACH, Variable.TIME, *phase)

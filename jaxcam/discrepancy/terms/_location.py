@@ -1,16 +1,15 @@
 """Where in a system missing physics is sought: a coordinate and a gap."""
 
 import dataclasses
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from ...fitting import Sensor
+from ...fitting import Problem
+from ...fitting.engine import filtered_channels
 from ...hybrid import HybridSystem
 from ._term import Term
-from ._with_terms import WithTerms
 
 
 class Location(NamedTuple):
@@ -30,8 +29,16 @@ class Location(NamedTuple):
         return dataclasses.replace(term, constraint=self.constraint)
 
     def reordered(self, term: Term, coordinates: int) -> Term:
-        """Return a term of one's own, which keeps its coordinate in the new order."""
-        place = self._order(coordinates).index(term.coordinate)
+        """Return a term of one's own, which keeps its coordinate in the new order.
+
+        **Raises:** `ValueError` if there is no such coordinate.
+        """
+        if not -coordinates <= term.coordinate < coordinates:
+            raise ValueError(
+                f"The term {term.name!r} acts on coordinate {term.coordinate}, but the "
+                f"system has {coordinates}; they are counted from 0."
+            )
+        place = self._order(coordinates).index(term.coordinate % coordinates)
         return dataclasses.replace(term, coordinate=place)
 
     def _order(self, number: int) -> list[int]:
@@ -41,37 +48,33 @@ class Location(NamedTuple):
     def said(
         self, system: HybridSystem, pairs: tuple[tuple[int, int], ...]
     ) -> tuple[str, str]:
-        """Return the names of the coordinate and of the gap; numbers if they have
-        none.
+        """Return the names of the coordinate and of the gap; if they have none, their
+        indices.
         """
-        states, gaps = system.state_names, system.constraint_names
-        place = pairs[self.coordinate][0]
-        return (
-            states[place] if states else str(self.coordinate + 1),
-            gaps[self.constraint] if gaps else str(self.constraint + 1),
+        states, place = system.state_names, pairs[self.coordinate][0]
+        coordinate = (
+            states[place] if place < len(states) else f"state component {place}"
         )
+        return coordinate, system.constraint_name(self.constraint)
 
 
-def other_locations(
-    system: HybridSystem,
-    pairs: tuple[tuple[int, int], ...],
-    sensors: Mapping[str, Sensor],
-) -> list[Location]:
+def other_locations(problem: Problem) -> list[Location]:
     """Return the locations at another measured coordinate or another gap than the
     first.
     """
+    sensors, pairs = problem.model.sensors, problem.model.system.coordinates
     measured = {one.observe for one in sensors.values() if isinstance(one.observe, int)}
     found = [
         Location(coordinate=k)
         for k, (place, _) in enumerate(pairs)
         if k and place in measured
     ]
-    number = gaps_of(WithTerms(system, (), pairs))
-    return found + [Location(constraint=c) for c in range(1, number)]
+    return found + [Location(constraint=c) for c in range(1, gaps_of(problem))]
 
 
-def gaps_of(system) -> int:
-    """Return the number of gaps of a system with terms."""
-    state = jax.ShapeDtypeStruct((1 + max(map(max, system.coordinates)),), jnp.float64)
+def gaps_of(problem: Problem) -> int:
+    """Return the number of gaps of the system of a problem."""
+    size = problem.start.states.shape[-1] - len(filtered_channels(problem.model))
+    state = jax.ShapeDtypeStruct((size,), jnp.float64)
     time = jax.ShapeDtypeStruct((), jnp.float64)
-    return jax.eval_shape(system.base.gap, time, state).size
+    return jax.eval_shape(problem.model.system.base.gap, time, state).size

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from ...fitting import Model, Parameter
-from ._term import Motion, terms_of
+from ._term import Motion, terms_of, watching
 from ._where import Where
 from ._with_terms import drive_at
 
@@ -18,15 +18,6 @@ def watched(model: Model) -> Model:
     name = watching(model)
     sensor = dataclasses.replace(model.sensors[name], error=_error)
     return dataclasses.replace(model, sensors={**model.sensors, name: sensor})
-
-
-def watching(model: Model) -> str:
-    """Return the first channel that measures the first coordinate, or the first
-    channel.
-    """
-    place, _ = model.system.coordinates[0]  # pyright: ignore
-    shown = [name for name, one in model.sensors.items() if one.observe == place]
-    return next(iter(shown or model.sensors))
 
 
 # Possible errors of any sensor

@@ -295,5 +295,14 @@ def terms_of(model: Model) -> tuple[Term, ...]:
     return model.system.terms  # pyright: ignore
 
 
+def watching(model: Model) -> str:
+    """Return the first channel that measures the first coordinate, or the first
+    channel.
+    """
+    place, _ = model.system.coordinates[0]  # pyright: ignore
+    shown = [name for name, one in model.sensors.items() if one.observe == place]
+    return next(iter(shown or model.sensors))
+
+
 def _first(model: Model):
-    return next(iter(model.sensors.values()))
+    return model.sensors[watching(model)]

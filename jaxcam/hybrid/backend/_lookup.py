@@ -12,8 +12,8 @@ from ._elementwise import converted
 from ._writer import INT32, INT64, kind_of, Lacking, Place, Writer
 
 
-# maximum number of values on the stack
-_KEPT = 16384
+# maximum number of computed values that lookups store on the stack, in all
+_KEPT = 4096
 
 
 @no_type_check
@@ -124,7 +124,8 @@ def _constant(w: Writer, elements, dtype):
 @no_type_check
 def _stored(w: Writer, elements, dtype) -> Place:
     kind = kind_of(dtype)
-    if kind == ir.IntType(1) or len(elements) > _KEPT:
+    w.stored += len(elements)
+    if kind == ir.IntType(1) or w.stored > _KEPT:
         raise Lacking(f"lookups in a computed table of {len(elements)} {dtype}")
     room = w.memory(w.vector(kind), len(elements))
     for k, element in enumerate(elements):

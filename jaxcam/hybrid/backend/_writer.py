@@ -90,6 +90,8 @@ class Writer:
         self.mask: Any = None
         # where loaded values are in memory, by the identity of the values
         self.places: dict[int, Place] = {}
+        # number of values that lookups have stored on the stack
+        self.stored = 0
         # tables of known numbers
         self.constants: dict[tuple[str, bytes], ir.GlobalVariable] = {}
 
