@@ -121,16 +121,17 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed
         )
-    separate = [one for one in (different, without) if _explains(one, best.bic)]
-    if separate and left:
-        fewest = min(separate, key=lambda one: one.bic)
+    options = [one for one in (different, without) if one is not None]
+    separate = [one for one in options if _explains(one, best.bic)]
+    fewest = min(separate, key=lambda one: one.bic, default=None)
+    if fewest is not None and left:
         if missing is None or fewest.bic < missing.score:
             # no function common to the recordings explains as much
             missing, needed_parts, others = None, None, ()
             settled = True
     if settled:
         doubtful = []
-        if separate and fewest is without:
+        if fewest is not None and fewest is without:
             # the terms only imitated the differences
             different, best, left_after, held = without, before, left_before, None
             inclusion, deviation = redrawn(trials, best, seed)
@@ -178,9 +179,9 @@ def _settled(
     return max(common, default=0.0) < policy.as_much * different.gained
 
 
-def _explains(different: Differing | None, bic: float) -> bool:
+def _explains(different: Differing, bic: float) -> bool:
     """Return whether separate values leave only noise and have a smaller BIC."""
-    return different is not None and different.complete and different.bic < bic
+    return different.complete and different.bic < bic
 
 
 def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Trial]:

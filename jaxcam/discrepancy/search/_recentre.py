@@ -22,8 +22,9 @@ _ALIKE = 0.9
 
 def recentred(fits: FreeFits, found: Missing) -> Missing:
     """Return the fit with one function instead of two, if it has more evidence."""
-    for one in found.functions:
-        other = _partner(found, one)
+    curves = [f for f in found.functions if isinstance(f, Free) and f.smooth]
+    for one in curves:
+        other = _partner(curves, one)
         if other is None or not _proportional(found, one, other):
             continue
         both = found
@@ -32,7 +33,7 @@ def recentred(fits: FreeFits, found: Missing) -> Missing:
             rest = tuple(f for f in both.functions if f.slot != one.slot)
             subset = Subset(found.problem, (moved, *rest), found.names)
             both = fits.fitted(subset, both.fit.point)
-            one = next(f for f in both.functions if f.slot == one.slot)
+            one = _in_slot(both, one)
         moved = _moved(both, one, other)
         rest = tuple(f for f in both.functions if f.slot not in (one.slot, other.slot))
         values = emptied(found.problem, both.fit.point.values, other.slot)
@@ -45,25 +46,25 @@ def recentred(fits: FreeFits, found: Missing) -> Missing:
     return found
 
 
-def _partner(found: Missing, one) -> Free | None:
-    """Return the force of the same argument as a stiffness, if both are curves."""
-    if not _is_curve(one) or one.family.factor is not Factor.DEFLECTION:
+def _in_slot(found: Missing, one: Free) -> Free:
+    """Return the function of a fit in the slot of another."""
+    (fresh,) = (f for f in found.functions if f.slot == one.slot)
+    assert isinstance(fresh, Free)
+    return fresh
+
+
+def _partner(curves: list[Free], one: Free) -> Free | None:
+    """Return the force of the same argument as a stiffness."""
+    if one.family.factor is not Factor.DEFLECTION:
         return None
     alike = dataclasses.replace(one.family, factor=Factor.ONE)
-    return next(
-        (f for f in found.functions if _is_curve(f) and f.family.name == alike.name),
-        None,
-    )
+    return next((f for f in curves if f.family.name == alike.name), None)
 
 
 def _proportional(found: Missing, one: Free, other: Free) -> bool:
     stiffness, force = (_values(found, f) for f in (one, other))
     sizes = np.linalg.norm(stiffness) * np.linalg.norm(force)
     return abs(float(stiffness @ force)) > _ALIKE * float(sizes)
-
-
-def _is_curve(one) -> bool:
-    return isinstance(one, Free) and one.smooth
 
 
 def _moved(found: Missing, one: Free, other: Free) -> Free:

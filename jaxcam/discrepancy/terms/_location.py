@@ -62,7 +62,8 @@ def other_locations(problem: Problem) -> list[Location]:
     """Return the locations at another measured coordinate or another gap than the
     first.
     """
-    sensors, pairs = problem.model.sensors, problem.model.system.coordinates
+    system, sensors = problem.model.system, problem.model.sensors
+    pairs = system.coordinates  # pyright: ignore
     measured = {one.observe for one in sensors.values() if isinstance(one.observe, int)}
     found = [
         Location(coordinate=k)
@@ -77,4 +78,5 @@ def gaps_of(problem: Problem) -> int:
     size = problem.start.states.shape[-1] - len(filtered_channels(problem.model))
     state = jax.ShapeDtypeStruct((size,), jnp.float64)
     time = jax.ShapeDtypeStruct((), jnp.float64)
-    return jax.eval_shape(problem.model.system.base.gap, time, state).size
+    base = problem.model.system.base  # pyright: ignore
+    return jax.eval_shape(base.gap, time, state).size
