@@ -80,7 +80,7 @@ class Policy:
         "the fraction of the explained cost that may remain",
     )
     form_loss: float = _decides(10.0, "loss in BIC up to which a formula is kept")
-    elsewhere: float = _decides(0.5, "largest share of a residual left elsewhere")
+    elsewhere: float = _decides(0.5, "share of a residual another place may leave")
     corner_share: float = _decides(
         3e-4,
         "fraction of the explained cost that the smoothing of dry friction at zero "
