@@ -88,3 +88,7 @@ def test_the_two_stay_if_they_have_more_evidence(
     found.fit, found.problem = first, None
     chosen = recentred(SimpleNamespace(fitted=fitted), found)  # pyright: ignore
     assert len(chosen.functions) == functions
+    if functions == 1:
+        (left,) = chosen.functions
+        assert left.slot == STIFFNESS.slot
+        assert left.family.middle < STIFFNESS.family.middle
