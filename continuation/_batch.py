@@ -37,7 +37,7 @@ class Batch:
     count: np.ndarray
     """Number of points of each branch, shape `(branches,)`."""
     reasons: tuple[str, ...]
-    """Reason for the end of each branch, one sentence each."""
+    """Reason why each branch ended, as one sentence."""
     name: str
     """Name of the parameter."""
     _passed: Corrected

@@ -33,7 +33,7 @@ def branch(
 ) -> Branch:
     """Follow a branch of solutions to its end and return it.
 
-    The other arguments are those of [`continuation.follow`][].
+    [`continuation.follow`][] describes the common arguments in more detail.
 
     Args:
         problem: The problem, or a hybrid system with one of its orbits as `start`.

@@ -114,7 +114,7 @@ def curve(
             resonances) and zeros of monitors.
 
     Raises:
-        ValueError: The point does not form a curve, or as for
+        ValueError: Points of this kind do not form a curve; or as for
             [`continuation.follow`][].
 
     Examples:

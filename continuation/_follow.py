@@ -30,26 +30,27 @@ def follow(
 ) -> Iterator[Point]:
     """Follow a branch of solutions and yield its points, including special points.
 
-    The branch ends on a bound; when it returns to one of its earlier points; where
-    period-doubled orbits join those of half the period; at the zero of a monitor that
-    ends the problem, if there is no transition to another problem; if the smallest step
-    fails; or after `settings.max_points` points. The `reason` of the last point states
-    which of these applies.
+    The branch ends at a bound, at a return to one of its earlier points, where
+    period-doubled orbits join those of half the period, or at the zero of a monitor
+    that ends the problem, unless there is a transition to another problem. It also ends
+    if the smallest step fails, and after `settings.max_points` points. The `reason` of
+    the last point states the cause.
 
     Args:
         problem: The problem, such as [`continuation.Equilibrium`][]; or a hybrid
             system, with one of its orbits as `start`.
         start: A state `(n,)` at the parameter value of the problem, on the branch or
             close enough for Newton's method to converge; or a [`continuation.Start`][],
-            such as that of a branch to switch to; or a [`continuation.Point`][], from
-            which the branch continues exactly as it did originally.
+            such as the start of a branch to switch to; or a [`continuation.Point`][],
+            from which the branch continues exactly as it did originally.
         where: Selects the parameter, as in `lambda parameters: parameters.speed`.
         bounds: (lowest, highest) value of the parameter; the branch ends exactly there.
         algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: 1 to start towards larger parameters, -1 towards smaller ones.
-        history: The points before `start`, if that is a point; predictors that use
-            several points and the detection of accumulations need them.
+        history: The points before `start`, if `start` is a [`continuation.Point`][].
+            Predictors that use several points need them, and so does the detection of
+            accumulations.
 
     Returns:
         An iterator of [`continuation.Point`][].

@@ -11,8 +11,8 @@ StabilityKind = Literal["equilibrium", "map", "none"]
 
 
 class LocalDynamics(NamedTuple):
-    """The vector field or map around a solution, which has the eigenvalues of the
-    linearisation.
+    """The vector field or map around a solution; its Jacobian has the eigenvalues of
+    the linearisation.
     """
 
     at: Array

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 
 class Padded(NamedTuple):
-    """A problem with additional unknowns, whose equations are u = 0.
+    """A problem with additional unknowns, each fixed at zero by an equation u = 0.
 
     Examples:
         >>> import continuation
@@ -21,14 +21,14 @@ class Padded(NamedTuple):
     problem: Any
     """The problem with the additional unknowns."""
     kept: np.ndarray
-    """Position of each original unknown among them, shape `(n,)`."""
+    """Position of each original unknown among all unknowns, shape `(n,)`."""
     size: int
     """Number of unknowns including the additional ones."""
     lengths: Mapping[str, int] = MappingProxyType({})
     """Number of rows of observed quantities that are not padding, by name."""
 
     def positions(self, count: int) -> np.ndarray:
-        """Return the positions of the original unknowns and of those behind all.
+        """Return the positions of the original unknowns and of the entries after them.
 
         Args:
             count: Number of entries of a vector without the additional unknowns.

@@ -16,7 +16,7 @@ from .special import FLIP, flip_direction, HOPF
 
 
 class Equations(AbstractProblem):
-    """Equations function(u, parameters) = 0; stability is not computed.
+    """Equations of the form function(u, parameters) = 0; stability is not computed.
 
     An example is a discretised boundary value problem.
 

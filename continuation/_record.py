@@ -86,9 +86,9 @@ def load_branch(
 
     Args:
         path: The file to read.
-        problem: The problem of the branch. It is attached to the points, with their
-            parameters, so that branches can be switched at them and they can be
-            continued in two parameters.
+        problem: The problem of the branch. It is attached to each point, with the
+            parameters of that point, so that other branches can be followed from a
+            special point, and special points can be continued in two parameters.
 
     Returns:
         A [`continuation.Branch`][].

@@ -17,7 +17,8 @@ from ._point import Point
 def special_point(
     point: Point, where: Where, parameters: PyTree
 ) -> tuple[Float[Array, " n"], Float[Array, ""]]:
-    """Locate a special point for other values of the parameters; for `jit` and `jvp`.
+    """Locate a special point for other values of the parameters, also under `jit` and
+    `jvp`.
 
     Newton's method is applied to the extended system, starting at `point`; the
     derivative follows from the implicit function theorem. The parameters must be close

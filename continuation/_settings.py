@@ -21,8 +21,8 @@ class BranchSettings(eqx.Module):
     """
 
     tolerance: float = 1e-10
-    """Newton's iteration ends if the corrections, relative to the scales, are smaller
-    than this; the remaining error is about the square of it.
+    """Newton's iteration ends when the correction, relative to the scales, is smaller
+    than this value; the remaining error is about the square of the value.
     """
     max_iterations: int = 8
     """Maximum number of corrector iterations; if more are needed, the step is
@@ -31,11 +31,11 @@ class BranchSettings(eqx.Module):
     iterations: int = 4
     """Target number of corrector iterations for the step control."""
     step: float = 0.01
-    """First step."""
+    """Length of the first step."""
     min_step: float = 1e-8
-    """Smallest step."""
+    """Smallest step length."""
     max_step: float = 0.05
-    """Largest step."""
+    """Largest step length."""
     angle: float = 0.1
     """Target change of direction per step for the step control (rad)."""
     max_angle: float = 0.35
@@ -46,9 +46,9 @@ class BranchSettings(eqx.Module):
     """Whether to locate and report special points."""
     localise: str = "auto"
     """Method of locating special points. `"newton"` solves the extended system, which
-    needs second derivatives of the residual; `"bracket"` does not need them and
-    brackets the point by points of the branch; `"auto"` is `"bracket"` if
-    `problem.costly` is set, otherwise `"newton"`.
+    needs second derivatives of the residual; `"bracket"` brackets the special point
+    between points of the branch and needs no second derivatives; `"auto"` is
+    `"bracket"` if `problem.costly` is set, otherwise `"newton"`.
     """
 
     def __check_init__(self):

@@ -26,8 +26,8 @@ class Start(eqx.Module):
     tangent: np.ndarray | None = None
     """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length
     does not matter. The first point is searched for in the plane perpendicular to it,
-    so that at a branch point the new branch is found and not the known one. Default:
-    along the branch through `state`, in the requested direction.
+    so that at a branch point the new branch is found rather than the known one.
+    Default: along the branch through `state`, in the requested direction.
     """
     step: float | None = None
     """First step; default: that of the settings."""

@@ -72,7 +72,8 @@ def switch(
 
     Returns:
         Two branches from a branch point, or one from a flip or a Hopf point. If the two
-            branches meet again, they are the same closed curve in both directions.
+            branches meet again, they are one closed curve, traversed in both
+            directions.
 
     Raises:
         ValueError: No branch is known to emanate from the point.

@@ -51,8 +51,9 @@ class Natural(AbstractAlgorithm):
     control: AbstractStepControl = EffortAndAngle()
     """Step control; by default, based on the number of iterations and the angle."""
     component: str = eqx.field(static=True, default="parameter")
-    """The fixed component: `"parameter"`, which stops at folds; or `"fastest"`, the
-    component that changes most at each step, which passes folds.
+    """The fixed component: `"parameter"`, with which the branch stops at folds; or
+    `"fastest"`, the component that changes most at each step, with which it passes
+    folds.
     """
     least_norm: ClassVar[bool] = False
     """Corrections leave one component unchanged, instead of having the least norm."""

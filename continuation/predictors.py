@@ -61,7 +61,7 @@ class Secant(AbstractPredictor):
 
 
 class Extrapolation(AbstractPredictor):
-    """Step in the parameter, with the state a linear function of it (thesis, eq.
+    """Take a step in the parameter, and extrapolate the state linearly (thesis, eq.
     3.40).
     """
 
@@ -81,8 +81,8 @@ class Extrapolation(AbstractPredictor):
 
 
 class PolynomialPredictor(AbstractPredictor):
-    """Extrapolate by a polynomial in arclength through the last points and the last
-    tangent.
+    """Extrapolate by a polynomial in arclength that matches the last points and the
+    last tangent.
 
     Examples:
         >>> import continuation

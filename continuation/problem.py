@@ -53,8 +53,8 @@ class AbstractProblem(eqx.Module):
     changed sign, its zero is located and yielded as a special point, and `transition`
     is called for a `Start` (None: the branch ends). Otherwise, `check(point b)` is
     called. If it returns a reason, a zero of an ending monitor is searched for between
-    a and b, then the step is halved; at the smallest step, the branch ends with that
-    reason. Finally, `refreshed` is called at b.
+    a and b, and then the step is halved; at the smallest step, the branch ends with
+    that reason. Finally, `refreshed` is called at b.
 
     Nothing else is needed for curves in two parameters: the problem is extended by the
     condition that the linearisation is singular or that a monitor is zero.
@@ -122,12 +122,12 @@ class AbstractProblem(eqx.Module):
         """Return the derivative of the residual with respect to u and the parameter,
         and `linearisation`.
 
-        Override it if the two share computations.
+        Override this method if both share computations.
 
         Args:
             p: Value of the parameter.
-            parameters_at: `parameters_at(p)` are the parameters with the value p for
-                the varying one.
+            parameters_at: Function of p that returns the parameters with the varying
+                one set to p.
 
         Returns:
             Shapes `(n, n+1)` and `(k, k)`.
@@ -142,10 +142,11 @@ class AbstractProblem(eqx.Module):
     ) -> LocalDynamics:
         """Return the vector field or map around a solution.
 
-        Normal-form coefficients are computed from its first three derivatives. Its
-        eigenvalues must be those of `linearisation`, and any others must not lie on the
-        imaginary axis or the unit circle. The default is G, or G + u for maps. Override
-        it together with `linearisation`, or set `normal_forms` to False.
+        Normal-form coefficients are computed from its first three derivatives. The
+        eigenvalues of its Jacobian must include those of `linearisation`; any others
+        must not lie on the imaginary axis or the unit circle. The default is G, or G +
+        u for maps. Override this method together with `linearisation`, or set
+        `normal_forms` to False.
 
         Returns:
             A `LocalDynamics`.
@@ -205,9 +206,9 @@ class AbstractProblem(eqx.Module):
     ) -> Float[Array, ""]:
         """Return the value of a single monitor, given its index in `monitors`.
 
-        With a traced index, one program finds the zeros of all monitors. If one of them
-        has `bracket`, indices are integers. Override this if it is less work than
-        `seen`.
+        With a traced index, one program finds the zeros of all monitors. If one of the
+        monitors has `bracket`, indices are integers. Override this method if one value
+        is cheaper to compute than `seen`.
 
         Returns:
             A scalar.
@@ -238,7 +239,7 @@ class AbstractProblem(eqx.Module):
         Args:
             name: Name of the monitor.
             before: Unknowns and parameters just before the point.
-            after: Unknowns and parameters just behind it.
+            after: Unknowns and parameters just after the point.
 
         Returns:
             A kind, or None.
@@ -247,7 +248,7 @@ class AbstractProblem(eqx.Module):
         return self.monitors()[name].kind
 
     def check(self, point: Any) -> str | None:
-        """Return None if the point is admissible, otherwise the reason as text.
+        """Return None if the point is admissible, otherwise the reason why it is not.
 
         Returns:
             A sentence, or None.
@@ -293,10 +294,11 @@ class AbstractProblem(eqx.Module):
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":
         """Return the same problem with its internal references updated at this point.
 
-        References are borders and phase conditions. They must depend only on the point
-        and not on the history, so that a resumed branch is identical. The exception is
-        signs: if test functions depend on them, they must be chosen to match the
-        previous ones. Structure and shapes must not change.
+        References are the vectors that border a singular matrix, and phase conditions.
+        They must depend only on the point and not on the history, so that a resumed
+        branch is identical. Signs are an exception: if test functions depend on the
+        sign of a reference, choose the sign that matches the previous one. Structure
+        and shapes must not change.
 
         Returns:
             A problem.
@@ -309,7 +311,8 @@ class AbstractProblem(eqx.Module):
     ) -> tuple[Any, str]:
         """Return the eigenvalues of `at.linearisation`, and a remark on them.
 
-        Override it if the matrix is unbounded at some points, and return the limits.
+        Override this method if the matrix is unbounded at some points, to return the
+        limits there.
 
         Args:
             at: The corrector's matrices and values.

@@ -10,9 +10,9 @@ from jaxtyping import Float, PyTree
 class AbstractRepresentation(eqx.Module):
     """Representations of the solutions of a problem, used to detect equal solutions.
 
-    A periodic orbit can begin at several of its points, and phases can be measured from
-    any whole period. The methods are called between compiled programs, with NumPy
-    arrays.
+    For example, a periodic orbit can start at any of several points, and its phases can
+    be measured from the start of any period. The methods are called between compiled
+    programs, with NumPy arrays.
     """
 
     family: eqx.AbstractVar[str]
@@ -39,8 +39,8 @@ class AbstractRepresentation(eqx.Module):
     def brought_near(
         self, states: Float[np.ndarray, "k n"], u: np.ndarray
     ) -> Float[np.ndarray, "k n"]:
-        """Return the same solutions with phases and angles shifted by full turns to be
-        closest to `u`.
+        """Return the same solutions, with phases shifted by whole periods and angles by
+        whole turns to be as close as possible to `u`.
 
         Args:
             states: Solutions, `(k, n)`.

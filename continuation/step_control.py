@@ -19,7 +19,7 @@ class Refusal(enum.StrEnum):
 
 
 class StepMeasures(NamedTuple):
-    """Measures of a step: NumPy numbers, or traced ones in a batch."""
+    """Measures of a step: NumPy numbers, or traced values in a batch."""
 
     iterations: Any
     """Number of corrector iterations."""

@@ -62,19 +62,19 @@ def covariant_vectors(
 ) -> CovariantVectors:
     """Compute the covariant Lyapunov vectors along a motion, including impacts.
 
-    Forwards in time, an orthonormal frame is propagated by the derivative M of each
-    period, M Q = Q' R. Backwards, vectors in this frame are propagated by the inverses
-    of the matrices R, under which they converge to the covariant directions (Ginelli et
-    al., Physical Review Letters 99, 130601, 2007). For a periodic orbit, these are the
-    eigenvectors of the monodromy matrix. The function is pure: it can be compiled, and
-    batched with `vmap` over states and parameters.
+    Forwards in time, an orthonormal frame is propagated by the derivative M of the flow
+    over each period, M Q = Q' R. Backwards, vectors in this frame are propagated by the
+    inverses of the matrices R, under which they converge to the covariant directions
+    (Ginelli et al., Physical Review Letters 99, 130601, 2007). For a periodic orbit,
+    these are the eigenvectors of the monodromy matrix. The function is pure: it can be
+    compiled, and batched with `vmap` over states and parameters.
 
     Args:
         system: The system.
         state: State at `t0`, shape `(n,)`.
         turns: Number of periods returned. They are preceded by `transient` periods, in
-            which transients decay and the frame converges, and followed by as many,
-            over which the vectors converge backwards.
+            which transients decay and the frame converges, and followed by the same
+            number, over which the vectors converge backwards in time.
         t0: Start time (s).
         transient: Number of periods before and after those returned.
         settings: Accuracy of the simulation; the default tolerance is 1e-12.

@@ -88,11 +88,14 @@ class GrazingForm(eqx.Module):
 
     @property
     def coefficient(self) -> Float[Array, ""]:
-        """The change H_x N b of the next smallest gap for a unit square root."""
+        """The change H_x N b of the smallest gap one period later, for a unit square
+        root.
+        """
         return self.normal @ self.matrix @ self.zero_time
 
     def depth(self, z: Float[Array, " n"], mu=None) -> Float[Array, ""]:
-        """Return the penetration depth that a deviation would have without an impact.
+        """Return the depth to which a motion with this deviation would penetrate
+        without an impact.
 
         Args:
             z: Deviation of the state, shape `(n,)`.
@@ -135,9 +138,8 @@ class GrazingForm(eqx.Module):
     def penetration(self, mu=None) -> Float[Array, ""]:
         """Return the parameter mu of Nordmark's map, [`variational.nordmark_map`][].
 
-        It is the depth of the orbit that would pass through the constraint, divided by
-        the square of the coefficient. It is defined only if the coefficient is
-        positive.
+        This is the depth of the orbit that would pass through the constraint, divided
+        by the square of `coefficient`. It is defined only if `coefficient` is positive.
 
         Args:
             mu: Change of the parameters, shape `(q,)`; default: none.
@@ -160,7 +162,8 @@ def grazing_form(
     where: Where | None = None,
     constraint: int = 0,
 ) -> GrazingForm:
-    """Compute the square-root map of an orbit that grazes a constraint or nearly does.
+    """Compute the square-root map of an orbit that grazes, or nearly grazes, a
+    constraint.
 
     Args:
         system: The system.

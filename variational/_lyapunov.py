@@ -72,11 +72,11 @@ def lyapunov_spectrum(
     max_steps: int = 10_000_000,
     progress: Callable[[float], None] | None = None,
 ) -> LyapunovSpectrum:
-    """Compute all Lyapunov exponents, including impacts, by repeated
+    """Compute all Lyapunov exponents of a motion with impacts by repeated
     orthonormalisation.
 
-    Tangent vectors pass through all steps and events of the motion, and are
-    orthonormalised repeatedly (Benettin et al., Meccanica 15, 1980; for impacts
+    Tangent vectors are propagated through all steps and events of the motion, and are
+    orthonormalised repeatedly (Benettin et al., Meccanica 15, 1980; for impacts,
     Mueller, Chaos, Solitons and Fractals 5, 1995).
 
     Args:
@@ -84,7 +84,7 @@ def lyapunov_spectrum(
         state: Initial state, shape `(n,)`, or `(motions, n)` for many motions at once.
         turns: Number of periods to average over, after the transient.
         t0: Start time (s).
-        transient: Number of periods before the average.
+        transient: Number of initial periods excluded from the average.
         turn: Length of a period (s); default: the forcing period.
         where: Selects the parameter that differs between motions.
         values: Value of that parameter in each motion, shape `(motions,)`.
@@ -100,7 +100,7 @@ def lyapunov_spectrum(
 
     Raises:
         ValueError: Shapes are inconsistent, there is no period, or a switching surface
-            has a hysteresis and the backend is XLA.
+            has hysteresis and the backend is XLA.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator

@@ -20,8 +20,8 @@ def poincare_derivative(
     """Return the derivative of the Poincaré map at a point of a periodic motion.
 
     It is the monodromy matrix projected onto the section along the flow (thesis, eq.
-    2.14). Its eigenvalues are zero, in the direction of the flow, and the nontrivial
-    multipliers of the orbit.
+    2.14). Its eigenvalues are the nontrivial multipliers of the orbit and a zero, which
+    belongs to the direction of the flow.
 
     Args:
         field: Vector field of an autonomous system, `field(state)`.

@@ -21,26 +21,28 @@ def switching_saltation(
     *,
     after: float | None = None,
 ) -> Float[Array, "n n"]:
-    """Return the saltation matrix of an event at a switching surface, without contacts.
+    """Return the saltation matrix of an event at a switching surface, with no
+    constraint in contact.
 
     With F- and F+ the vector field before and after, h the switching function, and R
     the reset (the identity unless the system has one),
 
         S = R_x + (F+ - R_t - R_x F-) h_x / (h_t + h_x F-),
 
-    explicit time included. Where the field is continuous, as in a bilinear oscillator,
-    S is the identity. At the beginning of sliding, the rank of S falls by one, because
-    perturbations are projected onto the surface. At the end of sliding, h is the
-    function that falls to zero there, and S is the identity unless `holding` exceeds
-    one. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
-    Systems, 2004, chapter 7)
+    which includes the explicit dependence on time. Where the field is continuous, as in
+    a bilinear oscillator, S is the identity. At the beginning of sliding, the rank of S
+    falls by one, because perturbations are projected onto the surface. At the end of
+    sliding, h is the function that falls to zero there, and S is the identity unless
+    `holding` exceeds one. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems, 2004, chapter 7)
 
     Args:
         system: The system.
         t: Time of the event (s).
         state: State at the event, shape `(n,)`.
         sides: Sides of all surfaces before the event, +1 or -1, or 0 while the motion
-            slides, shape `(k,)`. If they are traced, the event is a crossing.
+            slides, shape `(k,)`. If they are traced, the event is taken to be a
+            crossing.
         surface: Index of the surface of the event.
         after: Side of this surface after the event, 0 if sliding begins; default: the
             other side.

@@ -28,9 +28,9 @@ class Stability(eqx.Module):
     """The product of mu_i mu_j - 1 over i < j, times `scale`: zero at a Neimark-Sacker
     bifurcation."""
     scale: Float[Array, ""]
-    """A factor between 0 and 1 that vanishes with the slowest impact speed v, as M
-    grows like 1/v: the smallest value of v / (v + |a| period), with a the acceleration
-    of the gap.
+    """A factor between 0 and 1: the smallest value of v / (v + |a| period) over the
+    impacts, with impact speed v and acceleration a of the gap. It vanishes at grazing,
+    where M grows like 1/v.
     """
     reason: str = eqx.field(static=True)
     """Reason why some multipliers must be zero; otherwise empty."""
@@ -54,7 +54,7 @@ def floquet_multipliers(
         system: The system.
         orbit: The periodic orbit.
         method: As for [`variational.monodromy`][].
-        settings: Accuracy of "flow"; the default tolerance is 1e-12.
+        settings: Accuracy of the method "flow"; the default tolerance is 1e-12.
 
     Returns:
         Multipliers, shape `(n,)`, complex. At least two are zero if the orbit sticks,
@@ -87,8 +87,8 @@ def stability(system: HybridSystem, orbit: Orbit) -> Stability:
 
     The test functions are computed from the multipliers (Kuznetsov, Elements of Applied
     Bifurcation Theory, section 10.2) and multiplied by a factor proportional to the
-    impact speed, so that they remain bounded when an impact becomes grazing, and change
-    sign only at a bifurcation.
+    impact speed, so that they remain bounded as an impact approaches grazing, and
+    change sign only at a bifurcation.
 
     Args:
         system: The system.

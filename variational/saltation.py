@@ -28,9 +28,9 @@ def saltation_matrix(
 
         S = R_x + (F+ - R_t - R_x F-) H_x / (H_t + H_x F-),
 
-    which includes explicit time, so that moving constraints need no extra terms (M. di
-    Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical
-    Systems, 2008, chapter 2).
+    which includes the explicit dependence on time, so that moving constraints need no
+    extra terms (M. di Bernardo, C. J. Budd, A. R. Champneys, P. Kowalczyk,
+    Piecewise-smooth Dynamical Systems, 2008, chapter 2).
 
     Args:
         system: The system.
@@ -70,7 +70,7 @@ class SaltationParts(eqx.Module):
     regular: Float[Array, "n n"]
     """The bounded part, shape `(n, n)`."""
     singular: Float[Array, "n n"]
-    """The part divided by the speed, of rank one, shape `(n, n)`."""
+    """The rank-one part, which is divided by the speed, shape `(n, n)`."""
     speed: Float[Array, ""]
     """Normal velocity before the impact; zero at grazing."""
 

@@ -32,9 +32,9 @@ def periodic_orbits(
 
     Args:
         system: The system.
-        orbit: An orbit from [`continuation.periodic_orbit`][]; or an initial guess of
-            its state, or None, together with `period` or `periods` as for that
-            function.
+        orbit: An orbit from [`continuation.periodic_orbit`][]. Otherwise, pass an
+            initial guess of the state, or None, together with `period` or `periods`, as
+            for that function.
         period: As for [`continuation.periodic_orbit`][].
         periods: As for [`continuation.periodic_orbit`][].
         beyond: For an orbit that sticks, whether to continue beyond the interruption of

@@ -51,7 +51,7 @@ def periodic_orbit(
     t0: float = 0.0,
     settings: Settings | None = None,
 ) -> Orbit:
-    """Find a periodic orbit near a guess, stable or not, with any number of impacts.
+    """Find a stable or unstable periodic orbit with any number of impacts from a guess.
 
     The impacts of the motion from the guess define the equations of multiple shooting.
     If these cannot be solved, if the motion sticks, or if the system has switching
@@ -59,9 +59,9 @@ def periodic_orbit(
     the orbit is simulated; the simulation must return to the initial state.
 
     Args:
-        system: A [`jaxcam.hybrid.HybridSystem`][], forced or not.
-        guess: State at `t0`, shape `(n,)`. By default, the state to which the motion
-            has converged after some hundred forcing periods (on a stable orbit).
+        system: A [`jaxcam.hybrid.HybridSystem`][], with or without forcing.
+        guess: State at `t0`, shape `(n,)`. By default, the state reached after several
+            hundred forcing periods, which lies on a stable orbit.
         period: Period of the orbit (s); for a system without forcing, an initial guess.
         periods: Period of the orbit in forcing periods, instead of `period`. The
             default is 1; without a guess, the number is detected.

@@ -23,8 +23,8 @@ def orbits_near(
     """Return the distinct periodic orbits found from many guesses.
 
     The guesses are states at one phase of the forcing, such as the last points of a
-    sweep, the attractors found with their basins, or the samples of a recording (angles
-    and their derivatives) taken once per period.
+    sweep, the attractors found by a basin computation, or samples of a recording
+    (angles and their derivatives) taken once per period.
 
     Args:
         system: The system.
@@ -33,12 +33,12 @@ def orbits_near(
         periods: As for [`continuation.periodic_orbit`][].
         t0: As for [`continuation.periodic_orbit`][].
         settings: As for [`continuation.periodic_orbit`][].
-        same: Two orbits are equal if their states at `t0` differ by less than this,
-            relative to [`jaxcam.hybrid.sizes.component_sizes`][].
+        same: Two orbits count as equal if their states at `t0` differ by less than
+            this, relative to [`jaxcam.hybrid.sizes.component_sizes`][].
 
     Returns:
         The orbits in the order in which they were found. Guesses from which Newton's
-            method fails are omitted, so there may be none.
+            method fails are omitted, so the tuple may be empty.
 
     Raises:
         ValueError: `states` has the wrong shape.

@@ -48,18 +48,19 @@ class StickingOrbits(AbstractProblem):
 
     While the system sticks, it follows the constraint, so its state at release is
     independent of the past: it is given by the time t and the state x at which gap,
-    normal velocity and normal acceleration are zero. These are the equations; the
-    unknowns, shape `(3,)`, are the phase of release (time in forcing periods) and the
-    state there. All multipliers are zero. Two monitors determine where the orbit
-    exists:
+    normal velocity and normal acceleration are zero. These three conditions are the
+    equations. The unknowns, shape `(3,)`, are the phase of release (time in forcing
+    periods) and the state at release. All multipliers are zero. Two monitors determine
+    where the orbit exists:
 
     - the margin of [`variational.chatter_accumulation`][], which is zero if the impacts
-        accumulate exactly at the n-th release. There, the sticking time itself falls to
-        zero as a power of the distance and does not change sign (thesis, section
-        3.5.1), but the margin is smooth.
+        accumulate exactly at the n-th release. The sticking time itself is unsuitable
+        as a test function: it falls to zero as a power of the distance from this
+        interruption and does not change sign (thesis, section 3.5.1). The margin is
+        smooth.
     - the rate of change of the contact acceleration at release, relative to the forcing
-        period. It is zero if release and the next return to contact coincide, which is
-        the detachment point (valve float); beyond it, contact never ends.
+        period. It is zero at the detachment point (valve float), where release and the
+        next return to contact coincide; beyond that point, contact never ends.
 
     Beyond a zero of the first monitor, a branch continues with
     [`continuation.ImpactingOrbits`][] if `beyond` is set.

@@ -30,16 +30,16 @@ _SHORT = 1e-6
 class SingleShooting(AbstractProblem):
     """Periodic orbits whose events may change along a branch.
 
-    The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or without
-    forcing the state and the period (s), shape `(n + 1,)`. The equations
+    The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or,
+    without forcing, the state and the period (s), shape `(n + 1,)`. The equations
     require that a simulation return to the state and, without forcing, that the state
     lie in a plane perpendicular to the motion, which is updated at each point of a
     branch. One compiled program computes orbits with any number of impacts, crossings
     and sliding phases. The Jacobian contains the saltation matrices of all events.
     Points at which the sequence of events changes are located and named: `"grazing"`,
     `"grazing-sliding"`, `"crossing-sliding"`, `"switching-sliding"`, `"adding-sliding"`
-    or `"change of events"`. If it changes twice in one step, the second change may be
-    missed.
+    or `"change of events"`. If the sequence changes twice in one step, the second
+    change may be missed.
 
     Where an impact grazes, the Jacobian is unbounded on one side; follow orbits of
     systems without switching surfaces with [`continuation.ImpactingOrbits`][], which
@@ -75,7 +75,7 @@ class SingleShooting(AbstractProblem):
     periods: int = eqx.field(static=True)
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     turns: int = eqx.field(static=True, default=1)
-    """How many times an orbit without forcing is traversed: 2 after a flip."""
+    """Number of times that an orbit without forcing is traversed: 2 after a flip."""
 
     @staticmethod
     def of(
@@ -110,7 +110,7 @@ class SingleShooting(AbstractProblem):
         return Start(problem.refreshed(u, system), u)
 
     def times(self, u, parameters) -> tuple[Array, Array]:
-        """Return the times (s) of the state and of its return."""
+        """Return the times (s) at the start and at the end of the period."""
         if not self.periods:
             return jnp.zeros(()), u[-1]
         period = jnp.asarray(parameters.period, dtype=jnp.float64)
@@ -131,7 +131,8 @@ class SingleShooting(AbstractProblem):
         return jnp.append(off, beside)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
-        """Return the monodromy matrix, without forcing that of the map on the plane.
+        """Return the monodromy matrix or, without forcing, the derivative of the return
+        map on the plane.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -151,7 +152,7 @@ class SingleShooting(AbstractProblem):
         return across.T @ moved
 
     def scale(self, u, parameters) -> Float[Array, " u"]:
-        """Return the sizes of the components of the state, and the period.
+        """Return the scales of the state components and, without forcing, the period.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -169,11 +170,11 @@ class SingleShooting(AbstractProblem):
         return jnp.where(sizes > 0, sizes, 1.0)
 
     def seen(self, u, parameters):
-        """Return the monitors of the numbers of events, and the observed quantities.
+        """Return the monitors of the event counts, and the observed quantities.
 
-        The latter are the period (s), the time (s) and the state at the start of
-        the period, the number of impacts and, with forcing, the states at whole forcing
-        periods after that time, `(periods, n)`.
+        The observed quantities are the period (s), the time (s) and the state at the
+        start of the period, the number of impacts and, with forcing, the states at
+        whole forcing periods after that time, `(periods, n)`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

@@ -1,4 +1,4 @@
-"""Basins of two coexisting attractors of one oscillator."""
+"""The basins of two coexisting attractors of an impact oscillator."""
 
 from jaxcam import sweeps
 from jaxcam.models import ImpactOscillator

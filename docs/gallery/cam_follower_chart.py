@@ -1,6 +1,6 @@
-"""Bifurcations of the cam-follower against speed and coefficient of restitution: the
-orbit with one impact per cycle is stable between its fold and its flip, and chatter is
-complete between detachment and interruption."""
+"""Bifurcations of the cam-follower in the plane of speed and coefficient of
+restitution: the orbit with one impact per cycle is stable between its fold and its
+flip, and chatter is complete between detachment and interruption."""
 
 import equinox as eqx
 import jax.numpy as jnp

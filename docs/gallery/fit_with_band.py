@@ -1,5 +1,6 @@
 """A simulated recording of a pendulum and the fitted model: nearly all residuals lie
-within a band of plus or minus twice the noise, so the model explains the recording."""
+within a band of plus or minus two standard deviations of the noise, so the model
+explains the recording."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -1,5 +1,5 @@
-"""The square-root map near grazing: most steps are small and linear, but an
-occasional impact moves the state far away."""
+"""The square-root map near grazing: most iterations change the state only slightly and
+linearly, but an occasional impact moves it far away."""
 
 import variational
 from jaxcam.plotting import cobweb

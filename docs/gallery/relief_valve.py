@@ -1,5 +1,5 @@
-"""Maxima of the lift of a relief valve without forcing, as a function of the flow: it
-impacts on its seat at small flows, and comes to rest at large ones."""
+"""Maxima of the lift of a relief valve without forcing, as a function of the flow: the
+valve hits its seat at small flows and comes to rest at large flows."""
 
 import numpy as np
 

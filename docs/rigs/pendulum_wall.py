@@ -18,7 +18,7 @@ class PendulumWall(HybridSystem):
     restitution: float = 0.7
     speed: float = 10.0  # speed of the drive, rad/s
     phase: float = 0.0  # phase of the drive at time zero, rad
-    acceleration: float = 0.0  # of the drive, rad/s^2
+    acceleration: float = 0.0  # acceleration of the drive, rad/s^2
 
     @property
     def period(self):

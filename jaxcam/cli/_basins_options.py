@@ -31,18 +31,19 @@ class Cells:
         typer.Option(metavar="K,L", help="Number of cells along each state component."),
     ] = "128,128"
     turns: Annotated[
-        int, typer.Option(metavar="N", help="Forcing periods per simulation.")
+        int,
+        typer.Option(metavar="N", help="Number of forcing periods per simulation."),
     ] = 100
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Final periods that are compared.")
+        int, typer.Option(metavar="N", help="Number of final periods to compare.")
     ] = 24
     reruns: Annotated[
         int,
         typer.Option(
             metavar="N",
             help=(
-                "How often a simulation that is not yet periodic is extended to twice "
-                "its length."
+                "Number of times to double the length of a simulation that is not yet "
+                "periodic."
             ),
         ),
     ] = 1

@@ -33,7 +33,7 @@ def continue_(
     resume: Resume = False,
 ) -> None:
     """
-    Follow a branch of periodic orbits as a parameter changes; list its bifurcations.
+    Follow a branch of periodic orbits in a parameter and list its bifurcations.
 
     \b
     Examples:

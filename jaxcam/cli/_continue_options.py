@@ -92,10 +92,19 @@ class Following:
         typer.Option(metavar="N", help="Period of the orbit, in forcing periods."),
     ] = None
     direction: Annotated[
-        str, typer.Option(metavar="NAME", help=f"One of {', '.join(DIRECTIONS)}.")
+        str,
+        typer.Option(
+            metavar="NAME",
+            help=f"Direction in which to follow the branch: one of "
+            f"{', '.join(DIRECTIONS)}.",
+        ),
     ] = "both"
     algorithm: Annotated[
-        str, typer.Option(metavar="NAME", help=f"One of {', '.join(ALGORITHMS)}.")
+        str,
+        typer.Option(
+            metavar="NAME",
+            help=f"Continuation algorithm: one of {', '.join(ALGORITHMS)}.",
+        ),
     ] = "pseudo-arclength"
     max_points: Annotated[
         int,

@@ -14,8 +14,8 @@ def demo(
         Path | None,
         typer.Option(
             metavar="CASE",
-            help="A folder of cam-follower recordings, one CSV file each; default: the "
-            "simulated recordings in the package.",
+            help="A folder of cam-follower recordings, one CSV file per recording; "
+            "default: the simulated recordings in the package.",
         ),
     ] = None,
     rig: Annotated[
@@ -26,8 +26,8 @@ def demo(
         str,
         typer.Option(
             metavar="NAME",
-            help="Recordings with missing samples: refuse (stop with an error) or "
-            "split (divide at every gap).",
+            help="Handling of recordings with missing samples: refuse (stop with an "
+            "error) or split (divide at every gap).",
         ),
     ] = "refuse",
     out: Annotated[
@@ -49,7 +49,7 @@ def demo(
     ] = True,
 ) -> None:
     """
-    Compare recordings with a model, diagnose it, and follow two branches of orbits.
+    Compare recordings with a model, diagnose the model and follow two orbit branches.
 
     By default, the simulated recordings shipped with the package are used. The report
     with its figures is DIR/index.html, the data are in DIR/result.json, and the

@@ -20,7 +20,7 @@ class Branches:
     caption: str
 
 
-HEADINGS = ("orbit", "event", "at (rpm)", "largest multiplier (modulus)")
+HEADINGS = ("orbit", "event", "speed (rpm)", "largest multiplier (modulus)")
 _CAPTION = (
     "Continuation for the cam-follower rig of the thesis (Alzate, 2008): follower "
     "angle, sampled once per cycle, against cam speed. Stable orbits are solid, "

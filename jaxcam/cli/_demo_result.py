@@ -95,7 +95,7 @@ def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
 def print_result(output: Output, found: DemoResult) -> None:
     """Print tables and sentences to the terminal."""
     if found.simulated:
-        output.print("The recordings shipped with the package are simulated.")
+        output.print("These recordings, shipped with the package, are simulated.")
     for run in found.segments:
         output.print(run.sentence())
     output.print(found.comparison.table())
@@ -138,13 +138,13 @@ def _next_steps(found) -> list[tuple[str, str]]:
         ),
         (
             "jaxcam simulate --rig cart.toml --state 0,0.8 --t1 3 --out ./cart-run",
-            "Its motion. For a driven system, continue with jaxcam diagram and "
-            "jaxcam continue.",
+            "The motion of that system. If your system is driven, continue with jaxcam "
+            "diagram and jaxcam continue.",
         ),
         (
             "jaxcam diagnose CASE --rig cart.toml --out ./report",
-            "A recording of your own: CASE is a folder with one CSV file per "
-            "recording, whose columns are time_s and the channels of cart.toml.",
+            "Recordings of your own: CASE is a folder with one CSV file per recording, "
+            "whose columns are time_s and the channels of cart.toml.",
         ),
         (
             "jaxcam demo --case DIR --rig DIR/rig.toml",

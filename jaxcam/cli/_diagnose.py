@@ -149,8 +149,9 @@ def _print(output, found, notes, outlook) -> None:
     for sentence in (*notes, found.summary, *caveats):
         output.print(sentence)
     output.print(
-        f"Error on held-out flights: {found.heldout_before:.3e} {found.unit} before, "
-        f"{found.heldout_after:.3e} after; noise: {found.noise_floor:.3e}."
+        f"Error on held-out flights: {found.heldout_before:.3e} {found.unit} with the "
+        f"textbook model, {found.heldout_after:.3e} with the missing effects; noise: "
+        f"{found.noise_floor:.3e}."
     )
     for table in outlook.tables():
         output.print(terminal_table(table))

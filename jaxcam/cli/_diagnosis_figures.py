@@ -66,8 +66,9 @@ _UNSEEN = (
 )
 _MAPS = (
     "Mean residual of each recording against {}, in standard errors, before (left) "
-    "and after (right): flights at the top, contacts (if any) at the bottom. For pure "
-    "noise, one such map in a hundred would exceed the colour range."
+    "and after (right) the missing effects are added: flights at the top, contacts (if "
+    "any) at the bottom. For pure noise, one such map in a hundred would exceed the "
+    "colour range."
 )
 _SHAPES = (
     "Estimated corrections of the textbook model (grey) and of the model with the "

@@ -65,9 +65,9 @@ def _effects(found: Diagnosis) -> list[str]:
         "parameters",
         "where",
         "fraction of the misfit",
-        "BIC",
+        "delta BIC",
         "gain in held-out ln L",
-        "bootstrap",
+        "bootstrap inclusion",
     )
     rows = [
         (
@@ -123,9 +123,9 @@ def _alternatives(found: Diagnosis) -> list[str]:
     ]
     return [
         "<h2>Other explanations</h2>",
-        table_html(("terms", "BIC", "reason for rejection"), rows, text=(0, 2)),
-        '<p class="note">The column BIC gives the BIC of each explanation minus that '
-        "of the verdict.</p>",
+        table_html(("terms", "delta BIC", "reason for rejection"), rows, text=(0, 2)),
+        '<p class="note">Delta BIC is the BIC of each explanation minus that of the '
+        "verdict.</p>",
     ]
 
 
@@ -152,7 +152,7 @@ def _left_over(found: Diagnosis) -> list[str]:
 
 def _parameters(found: Diagnosis) -> list[str]:
     rows = [(name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()]
-    headings = ("parameter", "textbook", "with the missing effects")
+    headings = ("parameter", "textbook model", "with the missing effects")
     return [
         "<h2>Parameters of the rig</h2>",
         table_html(headings, rows, text=(0,)),
@@ -171,5 +171,5 @@ def _limits(found: Diagnosis) -> list[str]:
         )
         for name, one in found.limits.items()
     ]
-    headings = ("parameter", "smallest strength", "absorbed by")
+    headings = ("parameter", "smallest detectable strength", "mostly absorbed by")
     return ["<h2>Detection limits</h2>", table_html(headings, rows, text=(0, 2))]

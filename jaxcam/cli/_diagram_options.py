@@ -31,10 +31,10 @@ class Sweep:
         int, typer.Option(metavar="N", help="Number of parameter values.")
     ] = 200
     turns: Annotated[
-        int, typer.Option(metavar="N", help="Forcing periods at each value.")
+        int, typer.Option(metavar="N", help="Number of forcing periods at each value.")
     ] = 300
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Final periods that are drawn.")
+        int, typer.Option(metavar="N", help="Number of final periods to draw.")
     ] = 100
     direction: Annotated[
         str,
@@ -55,7 +55,11 @@ class Sweep:
         ),
     ] = None
     section: Annotated[
-        str, typer.Option(metavar="NAME", help=f"One of {', '.join(SECTIONS)}.")
+        str,
+        typer.Option(
+            metavar="NAME",
+            help=f"Sample once per period or at each impact: {' or '.join(SECTIONS)}.",
+        ),
     ] = "stroboscope"
 
     def check(self) -> None:

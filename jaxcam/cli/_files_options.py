@@ -32,7 +32,10 @@ class Files:
     ] = None
     split: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="Column that numbers the recordings."),
+        typer.Option(
+            metavar="COLUMN",
+            help="Column that numbers the recordings, for files that contain several.",
+        ),
     ] = None
 
     def check(self) -> None:

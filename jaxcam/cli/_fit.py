@@ -19,7 +19,8 @@ def fit(
     bootstrap: Annotated[
         int,
         typer.Option(
-            metavar="N", help="Standard errors from N Bayesian bootstrap replicates."
+            metavar="N",
+            help="Also compute standard errors from N Bayesian bootstrap replicates.",
         ),
     ] = 0,
     json_file: Annotated[
@@ -42,7 +43,7 @@ def fit(
 
     The rig is a cam-follower or any system defined in a Python file; see jaxcam
     new-rig. If CASE is a file with one impact per row (columns before_m_s and
-    after_m_s), a restitution law is fitted.
+    after_m_s), a restitution law is fitted instead.
 
     \b
     Examples:

@@ -32,7 +32,7 @@ def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
         table.add_column(heading, justify="right")
     for name, gain in found.delta_bic.items():
         law = found.laws.get(name)
-        cells = "as for the constant law"
+        cells = "same as the constant law"
         if law is not None:
             rows = zip(law.names, law.values, law.stderr)
             cells = ", ".join(f"{n} = {v:.5g} +- {e:.1g}" for n, v, e in rows)

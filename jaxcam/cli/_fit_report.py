@@ -17,7 +17,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
     """Tabulate nominal and fitted values with their errors."""
     table = Table(title="Parameters")
     table.add_column("parameter", no_wrap=True)
-    headings = ["nominal", "tolerance", "fitted", "stderr"]
+    headings = ["nominal", "tolerance", "fitted", "std. error"]
     if again is not None:
         headings.append("bootstrap")
     for heading in headings:

@@ -47,7 +47,7 @@ def new_rig(
         text = text.replace(f"{_FILE}.", f"{name.name}.")
         write_text(file, re.sub(rf"\b{_CLASS}\b", _class_name(name.name), text))
     code, rig = (shlex.quote(str(file)) for file in files)
-    typer.echo(f"Written: {code}, the system, and {rig}, its rig file. Edit both.")
+    typer.echo(f"Written: {code} (the system) and {rig} (its rig file). Edit both.")
     typer.echo(f"Try it: jaxcam simulate --rig {rig} --state 0,0.8 --t1 3")
     typer.echo(
         f"With a folder CASE of recordings: jaxcam fit CASE --rig {rig}, then jaxcam "

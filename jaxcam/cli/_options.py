@@ -18,15 +18,18 @@ def _shipped(case: Path) -> Path:
 
 
 System: TypeAlias = Annotated[
-    str, typer.Argument(metavar="SYSTEM", help=f"One of {', '.join(SYSTEMS)}.")
+    str,
+    typer.Argument(
+        metavar="SYSTEM", help=f"Built-in system: one of {', '.join(SYSTEMS)}."
+    ),
 ]
 SavedSystem: TypeAlias = Annotated[
     Path | None,
     typer.Option(
         "--system",
         metavar="FILE",
-        help="A system written by `jaxcam fit` or `diagnose`, or your own system, "
-        "FILE.py:CLASS.",
+        help="A system written by `jaxcam fit` or `jaxcam diagnose`, or your own "
+        "system as FILE.py:CLASS.",
     ),
 ]
 Preset: TypeAlias = Annotated[
@@ -69,7 +72,9 @@ Workers: TypeAlias = Annotated[
 Cluster: TypeAlias = Annotated[
     str | None,
     typer.Option(
-        metavar="ADDRESS", help="local, or tcp://host:port of a Dask scheduler."
+        metavar="ADDRESS",
+        help="Run on a Dask cluster: local, or the address of a scheduler, "
+        "tcp://host:port.",
     ),
 ]
 JsonFile: TypeAlias = Annotated[
@@ -80,15 +85,15 @@ JsonFile: TypeAlias = Annotated[
 ]
 Resume: TypeAlias = Annotated[
     bool,
-    typer.Option("--resume", help="Resume the interrupted command with --out DIR."),
+    typer.Option("--resume", help="Resume the interrupted command in --out DIR."),
 ]
 Case: TypeAlias = Annotated[
     Path,
     typer.Argument(
         metavar="CASE",
         help=(
-            "A folder of recordings, or one file; or demo (simulated) or pendulum "
-            "(real), the recordings in the package."
+            "A folder of recordings or a single file, or the name of a case in the "
+            "package: demo (simulated) or pendulum (real)."
         ),
         callback=_shipped,
     ),
@@ -109,7 +114,7 @@ Gaps: TypeAlias = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Recordings with missing samples or encoder slips: mend (repair, split at "
-        "long gaps), refuse, or split (at every gap).",
+        help="Handling of missing samples and encoder slips: mend (repair them, and "
+        "split at long gaps), refuse (stop with an error) or split (at every gap).",
     ),
 ]

@@ -32,7 +32,11 @@ class Outlook:
         if self.speeds:
             yield Rows(
                 "Cam speeds at which the motion changes",
-                ("transition", "textbook (rpm)", "with the missing effects (rpm)"),
+                (
+                    "transition",
+                    "textbook model (rpm)",
+                    "with the missing effects (rpm)",
+                ),
                 [(one.name, _rpm(one.before), _rpm(one.after)) for one in self.speeds],
                 "Predictions for this rig; the standard errors follow from those of "
                 "the fit.",
@@ -40,10 +44,10 @@ class Outlook:
         if self.experiments:
             yield Rows(
                 "Recommended next recording",
-                ("recording at", "ratio of errors", "parameters"),
+                ("recording at", "ratio of standard errors", "parameters"),
                 [(one.name, f"{one.factor:.0%}", _asked(one)) for one in self.shown],
-                "The ratio compares the standard errors with and without this "
-                "additional recording, computed from the sensitivities of the "
+                "The ratio is the standard error with this additional recording "
+                "divided by that without it, computed from the sensitivities of the "
                 "diagnosed model.",
             )
 

@@ -66,7 +66,8 @@ def _lacks(summary: str | None) -> list[str]:
         "<h2>Model discrepancy</h2>",
         *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(summary)),
         '<p class="note"><a href="diagnosis/index.html">Details of the diagnosis</a>: '
-        "the fit before and after, other explanations, and detection limits."
+        "the fits without and with the missing effects, other explanations, and "
+        "detection limits."
         "</p>",
     ]
 
@@ -93,9 +94,11 @@ def page(report: Report) -> str:
         *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
         table_html(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
-        '<p class="note">Each flight starts from its measured initial state, so the '
-        "residual shows what the model lacks in that mode. The ratio is the residual "
-        "in units of the sensor noise: 1 where nothing is missing.</p>",
+        '<p class="note">Each simulated flight starts from the measured initial state, '
+        "so the residual shows what the model lacks in that mode. The ratio is the "
+        "residual in units of the sensor noise: 1 where nothing is missing. The pieces "
+        "are flights, contacts or impacts; the last column gives the place of the most "
+        "significant deviation.</p>",
         "<h2>Contact intervals</h2>",
         table_html(
             HEADINGS, [row for one in report.rests for row in rest_rows(one)], (0, 1)
@@ -107,7 +110,7 @@ def page(report: Report) -> str:
         "coexists at the same speed.</p>",
         "<h2>Figures</h2>",
         *(figure_html(file, caption) for file, caption in report.figures),
-        "<h2>Runs</h2>",
+        "<h2>Recordings</h2>",
         f"<ul>{''.join(f'<li>{escape(run)}</li>' for run in report.runs)}</ul>",
         "<h2>Next: your own system, your own recording</h2>",
         *(

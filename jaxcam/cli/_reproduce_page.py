@@ -12,7 +12,13 @@ from ._reproduce_record import Origin, TargetRecord
 
 
 HEADINGS = ("quantity", "printed", "computed", "difference", "relative", "unit")
-_OVERVIEW = ("target", "", "largest relative difference", "values compared", "time")
+_OVERVIEW = (
+    "target",
+    "title",
+    "largest relative difference",
+    "values compared",
+    "time",
+)
 _MORE = """
 nav a { display: inline-block; padding: .15rem .45rem .15rem 0; color: inherit; }
 section { border-top: 1px solid var(--line); margin-top: 2.4rem; }

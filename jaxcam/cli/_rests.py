@@ -22,9 +22,8 @@ _SETTLE = 20.0
 class Intervals(NamedTuple):
     """Contact intervals, each from its start to the release.
 
-        - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped.
+    - `begins`, `ends`: cam angle (rad) at the start and end of each, not wrapped.
     - `turns`: number of cam turns examined.
-
     - `share`: fraction of the time in contact, including intervals truncated by the
       ends of the recording.
     """
@@ -82,8 +81,8 @@ def rests(run: Segments, motion: Trajectory) -> Rests:
 def rest_table(found: list[Rests]) -> Table:
     """Return a table with one row for each recording and kind, for the terminal."""
     table = Table(title="Contact intervals of the follower")
-    table.add_column("run", no_wrap=True)
-    table.add_column("")
+    table.add_column("recording", no_wrap=True)
+    table.add_column("source")
     for heading in HEADINGS[2:]:
         table.add_column(heading, justify="right")
     for one in found:
@@ -92,7 +91,14 @@ def rest_table(found: list[Rests]) -> Table:
     return table
 
 
-HEADINGS = ("run", "", "per cycle", "from (rad)", "to (rad)", "fraction of time")
+HEADINGS = (
+    "recording",
+    "source",
+    "per cycle",
+    "from (rad)",
+    "to (rad)",
+    "fraction of time",
+)
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:

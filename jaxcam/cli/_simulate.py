@@ -26,7 +26,7 @@ def simulate(
     ] = None,
 ) -> None:
     """
-    Simulate a system; list its impacts and contacts.
+    Simulate a system and list its impacts and contacts.
 
     \b
     Examples:

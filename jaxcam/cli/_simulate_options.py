@@ -18,8 +18,8 @@ class RunOptions:
         typer.Option(
             metavar="A,B",
             help="Initial state, such as 0.3,0, or release for the release point of a "
-            "sticking orbit. Default: release; 1,0 for the ball; 0,0.1,-2 for the "
-            "triple integrator.",
+            "sticking orbit. Default: release; 1,0 for the bouncing ball; 0,0.1,-2 for "
+            "the triple integrator.",
         ),
     ] = None
     t0: Annotated[float, typer.Option(metavar="S", help="Initial time (s).")] = 0.0
@@ -40,15 +40,16 @@ class RunOptions:
         float, typer.Option(metavar="E", help="Error tolerance per step.")
     ] = 1e-10
     solver: Annotated[
-        str, typer.Option(metavar="NAME", help=f"One of {', '.join(SOLVERS)}.")
+        str,
+        typer.Option(metavar="NAME", help=f"Solver: one of {', '.join(SOLVERS)}."),
     ] = "dopri8"
     engine: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
             help=(
-                "loop, or diffeqsolve (one diffrax call per flight; also supports "
-                "implicit solvers)."
+                "Engine: loop, or diffeqsolve (one diffrax call per flight; also "
+                "supports implicit solvers)."
             ),
         ),
     ] = None

@@ -39,12 +39,12 @@ def diagnose(
     keep: Path | None = None,
     policy: Policy = Policy(),
 ) -> Diagnosis:
-    """Diagnose from recordings which physics a model lacks.
+    """Determine from recordings which physics a model lacks.
 
     A diagnosis takes minutes; the notebooks contain an example. Terms of the library
-    and forces act on the first coordinate and the first gap, functions at impacts at
-    the first two gaps. Only if they leave a residual above the noise are they sought at
-    other coordinates and gaps as well, which takes as long again for each.
+    and forces are sought at the first coordinate and the first gap, and functions at
+    impacts at the first two gaps. Other coordinates and gaps are tried only if a
+    residual above the noise remains; each of them takes as long again.
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from

@@ -54,7 +54,8 @@ def event_causes(
     policy: Policy = Policy(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[EventCause, ...]:
-    """Rank terms by their fit to the speeds at which the type of motion changes.
+    """Rank terms by how well they explain the speeds at which the type of motion
+    changes.
 
     Each term is tried alone. Four speeds hardly distinguish between terms: those whose
     misfit is within a few units of the smallest are equally good.

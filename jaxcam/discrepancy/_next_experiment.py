@@ -71,9 +71,10 @@ def compare_experiments(
         records: Recordings simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and segmented.
         asked: Names of the parameters to be determined. The default is the strengths of
-            the named terms and the bands of unnamed functions; terms whose BIC is not
-            much worse stay free, so that the best recording also distinguishes them. If
-            the verdict is `none`, the default is all terms, one at a time.
+            the named terms and the values of unnamed functions. Alternative terms whose
+            BIC is not much worse stay free, so that the best recording also
+            distinguishes them from the named ones. If the verdict is `none`, the
+            default is all terms, one at a time.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:

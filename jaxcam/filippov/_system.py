@@ -15,11 +15,12 @@ class FilippovSystem(SwitchedSystem):
     state, even beyond the surface. Every floating-point field is a parameter. The state
     never jumps.
 
-    A start on the surface from which both fields point away has no unique motion; the
-    method `sides` chooses the side, by default that above.
+    If the motion starts on the surface and both fields point away from it, the motion
+    is not unique; the method `sides` then chooses the side, by default the one above.
 
-    It is a [`jaxcam.hybrid.SwitchedSystem`][] with one surface: `jaxcam.simulate`,
-    stroboscopes and `continuation.periodic_orbit` accept it.
+    A Filippov system is a [`jaxcam.hybrid.SwitchedSystem`][] with one surface:
+    `jaxcam.simulate`, `jaxcam.hybrid.stroboscope` and `continuation.periodic_orbit`
+    accept it.
 
     Examples:
         >>> from jaxcam.filippov import FilippovSystem

@@ -12,8 +12,8 @@ from ._system import FilippovSystem
 def surface_rates(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Return the rates of change of H along both fields, including time (thesis, eq.
-    3.9).
+    """Return the rates of change of H along both fields, including the explicit
+    dependence of H on time (thesis, eq. 3.9).
 
     Args:
         system: The system.
@@ -65,8 +65,9 @@ def equivalent_control(
     """Return Utkin's equivalent control of x' = f + g u with u = 1 above and -1 below.
 
     It solves H_t + H_x (f + g u) = 0 and is in [-1, 1] if the system slides. Because
-    the control enters linearly, the resulting field is that of Filippov. It is also the
-    dry-friction force divided by its maximum, or the mean output of a relay.
+    the control enters linearly, the resulting field is that of Filippov. The control
+    is the mean output of a relay; for dry friction, its magnitude is the friction force
+    divided by its maximum.
 
     Args:
         system: The system.

@@ -13,11 +13,12 @@ from .engine import Weights
 
 @dataclasses.dataclass(frozen=True)
 class Bootstrap:
-    """Estimates from a Bayesian bootstrap, in the order of the fit.
+    """Estimates from a Bayesian bootstrap, in the same order as in the fit.
 
-    Unlike the Fisher information, they account for the actual residuals: if the model
-    has a discrepancy, the estimates scatter more than the noise explains. The example
-    continues that of [`jaxcam.fitting.fit`][].
+    Unlike the standard errors from the Fisher information, the scatter of these
+    estimates reflects the actual residuals: if the model has a discrepancy, the scatter
+    is larger than the noise explains. The example continues the one in
+    [`jaxcam.fitting.fit`][].
 
     Examples:
         >>> from jaxcam.fitting import bootstrap
@@ -52,15 +53,15 @@ def bootstrap(
     iterations: int = 8,
     progress: Callable[[int, int], None] | None = None,
 ) -> Bootstrap:
-    """Repeat a fit with random weights of flights and contacts (Bayesian bootstrap over
-    blocks; Rubin, 1981).
+    """Repeat a fit with random weights for the flights and contacts (Bayesian bootstrap
+    over blocks; Rubin, 1981).
 
     A block is one flight with all its pieces, or one contact, because residuals are
     correlated within a flight or contact. The weights are exponentially distributed
-    with mean 1. Drawing blocks with replacement would give weights of the same mean and
-    variance, but would omit some blocks and the impacts at both their ends. Each
-    repetition starts at the optimum and needs few iterations. The example continues
-    that of [`jaxcam.fitting.fit`][].
+    with mean 1. Drawing blocks with replacement would give weights with the same mean
+    and variance, but would omit some blocks and the impacts at both of their ends. Each
+    repetition starts at the optimum and needs few iterations. The example continues the
+    one in [`jaxcam.fitting.fit`][].
 
     Args:
         found: The fit.
@@ -69,8 +70,7 @@ def bootstrap(
         prior: Whether tolerances count as prior knowledge; use the same value as for
             `found`.
         iterations: Maximum number of iterations in each repetition.
-        progress: Called with the number of completed repetitions and their total
-            number.
+        progress: Called with the number of completed repetitions and the total number.
 
     Returns:
         A [`jaxcam.fitting.Bootstrap`][].

@@ -15,7 +15,7 @@ def cam_follower_model(
 
     Args:
         rig: The rig.
-        channels: Channels to fit: `follower_angle_rad`, `gyro_rad_s`.
+        channels: Channels to fit: `follower_angle_rad`, `gyro_rad_s` or both.
 
     Returns:
         A [`jaxcam.fitting.Model`][].

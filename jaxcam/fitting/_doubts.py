@@ -34,12 +34,12 @@ class Doubt(enum.Enum):
 
 
 class Reason(NamedTuple):
-    """One doubt, and a sentence about it."""
+    """A reason not to trust a fit: a `Doubt`, and a sentence that explains it."""
 
     doubt: Doubt
-    """The doubt."""
+    """A `Doubt`."""
     sentence: str
-    """The sentence."""
+    """The doubt in words."""
 
 
 def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str:

@@ -35,8 +35,8 @@ class Ellipse:
     @property
     def axes(self) -> Float[np.ndarray, "d d"]:
         """Semi-axes, one per row, from the centre to the boundary, the longest first.
-        They are orthogonal with each parameter in units of its standard error, so they
-        do not depend on the units.
+        They are orthogonal when each parameter is expressed in units of its standard
+        error, so the choice of units does not affect them.
         """
         return (self._roots() * np.sqrt(self.limit)).T
 

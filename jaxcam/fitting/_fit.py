@@ -62,7 +62,7 @@ def fit(
     """Fit the free parameters of a problem.
 
     If neither `start` nor `stop` is given and the fit ends far above the noise, it is
-    repeated from other starts, and the best fit is returned.
+    repeated from other starting points, and the best fit is returned.
 
     Args:
         problem: The problem.
@@ -79,9 +79,9 @@ def fit(
         progress: Called with the iteration number and the cost.
 
     Returns:
-        A [`jaxcam.fitting.Fit`][]. It has `converged` only if it is at an optimum away
-            from all bounds, the noise explains the residuals, and every standard error
-            is finite; otherwise, `reasons` explains why not.
+        A [`jaxcam.fitting.Fit`][]. Its `converged` is true only if the fit is at an
+            optimum away from all bounds, the noise explains the residuals, and every
+            standard error is finite; if not, `reasons` lists what is wrong.
 
     Raises:
         ValueError: A name is not a parameter.
@@ -250,8 +250,9 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
     """Return the cost of held-out data for a fit.
 
     The parameters are not changed; the states of the pieces are fitted to the data,
-    because they cannot be predicted. Joints (continuity conditions) between held-out
-    pieces are included. The example continues that of [`jaxcam.fitting.fit`][].
+    because the parameters do not determine them. Joints (continuity conditions) between
+    held-out pieces are included. The example continues the one in
+    [`jaxcam.fitting.fit`][].
 
     Args:
         problem: The problem.

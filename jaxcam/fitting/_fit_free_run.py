@@ -35,7 +35,7 @@ class FreeRunFit:
     model: Model
     """The model with these parameters."""
     values: Mapping[str, float]
-    """Their values by name."""
+    """Values of the parameters by name."""
     runs: tuple[FreeRun, ...]
     """The free run of each recording."""
     converged: bool
@@ -52,11 +52,12 @@ def fit_free_run(
 ) -> FreeRunFit:
     """Fit parameters to complete free runs.
 
-    `fit` compares each piece of a recording with a prediction from the piece before,
+    `fit` compares each piece of a recording with a prediction from the preceding piece,
     and estimates the standard error of each parameter. This function minimises the
-    error of a simulation that starts at the first samples. A model discrepancy
-    accumulates in the simulation and biases the parameters, so no standard errors are
-    given. Channels are weighted by the inverse of their noise.
+    error of a simulation of the complete recording, which starts from the first
+    samples. The effect of a model discrepancy accumulates in the simulation and biases
+    the parameters, so no standard errors are given. Channels are weighted by the
+    inverse of their noise.
 
     Args:
         model: A system with its sensors and its input.

@@ -30,8 +30,8 @@ from .engine import (
 class Estimate:
     """A fitted number and its standard error, for all recordings or for one of them.
 
-    The error is infinite if the data do not constrain the value; the fit then reports
-    this and has not converged.
+    The standard error is infinite if the data do not constrain the value; the fit then
+    reports this and does not count as converged.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Estimate:
 class Fit:
     """The result of a fit.
 
-    The example continues that of [`jaxcam.fitting.fit`][].
+    The example continues the one in [`jaxcam.fitting.fit`][].
 
     Examples:
         >>> found.converged, found.free
@@ -145,7 +145,8 @@ class Fit:
         """Return whether the fit is at an optimum with residuals that the noise
         explains.
 
-        All standard errors are then finite; otherwise, `reasons` explains why not.
+        If true, all standard errors are finite; if false, `reasons` lists what is
+        wrong.
         """
         return not self.reasons
 
@@ -199,15 +200,16 @@ class Fit:
         return most_correlated([e.label for e in self.estimates], self.correlation)
 
     def model(self, record: int | str = 0) -> Model:
-        """Return the model with the fitted parameters; if recordings differ, those of
-        one recording.
+        """Return the model with the fitted parameters.
+
+        A parameter that differs between recordings has its value for `record`.
         """
         names = self.problem.records
         row = names.index(record) if isinstance(record, str) else record
         return self.problem.layout.at(self.point.values[row])
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain numbers and strings."""
+        """Return the fit as plain numbers and strings."""
         return {
             "parameters": [dataclasses.asdict(one) for one in self.estimates],
             "correlation": self.correlation.tolist(),

@@ -60,8 +60,8 @@ class FreeRun:
     state: Float[np.ndarray, " n"]
     """Initial state."""
     samples: int
-    """Number of samples from which the initial state was estimated; they do not count
-    in the error.
+    """Number of samples from which the initial state was estimated; the error excludes
+    them.
     """
 
     @property
@@ -84,10 +84,10 @@ def free_run(
 ) -> FreeRun:
     """Simulate a complete recording from its first samples and its input.
 
-    The state at the first sample is the one whose motion fits the first `samples` best.
-    From there on, only the measured input is used, held between samples, so errors
-    accumulate over the recording. System-identification benchmarks test a model in this
-    way, whereas a fit tests it piece by piece.
+    The initial state is the one whose motion best fits the first `samples` samples.
+    From there on, the simulation uses only the measured input, held between samples, so
+    errors accumulate over the recording. System-identification benchmarks test a model
+    in this way, whereas a fit tests it piece by piece.
 
     Args:
         model: A system with its sensors and its input, such as `found.model()`.

@@ -25,9 +25,9 @@ _MEMBER = 0.15
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """Combinations of parameters, in order of how well the data determine them.
+    """Combinations of parameters, ordered by how well the data determine them.
 
-    The example continues that of [`jaxcam.fitting.fit`][].
+    The example continues the one in [`jaxcam.fitting.fit`][].
 
     Examples:
         >>> from jaxcam.fitting import identify
@@ -133,12 +133,12 @@ class Identifiability:
 def identify(
     problem: Problem, names: Iterable[str] | None = None, at: Fit | None = None
 ) -> Identifiability:
-    """Analyse which parameters the recordings can determine, without fitting them.
+    """Analyse which parameters the recordings can determine, without a parameter fit.
 
     The analysis uses the Fisher information at the nominal parameters, with the states
     of all pieces eliminated. Its large eigenvalues belong to combinations that the data
     determine, its small ones to those that only the tolerances constrain. The example
-    continues that of [`jaxcam.fitting.fit`][].
+    continues the one in [`jaxcam.fitting.fit`][].
 
     Args:
         problem: The problem.

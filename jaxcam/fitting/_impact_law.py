@@ -166,11 +166,12 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     """Return the restitution law that a table of impacts supports.
 
     A constant coefficient of restitution and a power law, r = r0 (1 + v / v_ref)^-b
-    with the median speed as v_ref, are fitted by least squares. The standard deviation
-    of single impacts is estimated: that of the speed or that of the coefficient of
-    restitution is assumed to be constant, whichever is more likely; if the table states
-    standard errors, it is proportional to these. The power law is chosen if an F test
-    rejects a constant coefficient at the 1 % level.
+    with the median speed as v_ref, are fitted by least squares. The scatter of single
+    impacts is estimated from the data: the standard deviation of either the separation
+    speed or the coefficient of restitution is assumed to be constant, whichever is more
+    likely. If the table states standard errors, the scatter is assumed to be
+    proportional to them. The power law is chosen if an F test rejects a constant
+    coefficient at the 1 % level.
 
     Args:
         table: The impacts.

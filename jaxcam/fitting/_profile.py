@@ -62,19 +62,19 @@ def profile(
     """Compute a profile likelihood: fix one parameter at several values and fit all
     others.
 
-    The example continues that of [`jaxcam.fitting.fit`][].
+    The example continues the one in [`jaxcam.fitting.fit`][].
 
     Args:
         found: The fit, in which `name` was free.
         name: Name of the parameter.
-        reach: Range, in standard errors on both sides.
+        reach: Range of values on either side of the optimum, in standard errors.
         points: Number of values, including the optimum.
         values: Values at which to fix the parameter instead, in any order; a value is
             inside the 95 % interval if its cost is below 3.84.
         weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the value used for
             `found`.
-        progress: Called with the number of completed values and their total number.
+        progress: Called with the number of completed values and the total number.
 
     Returns:
         A `Profile`.
@@ -136,8 +136,8 @@ def excess_cost(
 
     This cost defines the joint confidence region of d parameters of a nonlinear model:
     values are inside if their cost is below the quantile of the chi-square distribution
-    with d degrees of freedom, `found.ellipse(names).limit`. The example continues that
-    of [`jaxcam.fitting.fit`][].
+    with d degrees of freedom, `found.ellipse(names).limit`. The example continues the
+    one in [`jaxcam.fitting.fit`][].
 
     Args:
         found: The fit, in which all parameters in `values` were free.

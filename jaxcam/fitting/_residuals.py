@@ -11,9 +11,9 @@ from .engine import predict
 
 @dataclasses.dataclass(frozen=True)
 class Residuals:
-    """Data minus model of one channel of one recording, in units of the channel.
+    """Data minus model for one channel of one recording, in the unit of the channel.
 
-    The example continues that of [`jaxcam.fitting.fit`][].
+    The example continues the one in [`jaxcam.fitting.fit`][].
 
     Examples:
         >>> from jaxcam.fitting import residuals
@@ -46,7 +46,8 @@ class Residuals:
         """Return the correlation of samples at lags 1, 2, ... within a flight or
         contact.
 
-        White residuals are within about `2 / sqrt(k)` of zero.
+        For k samples with white residuals, the correlations are within about
+        `2 / sqrt(k)` of zero.
         """
         scale = np.mean(self.value**2)
         found = []
@@ -61,7 +62,7 @@ class Residuals:
 def residuals(found: Fit) -> list[Residuals]:
     """Return the residuals of each recording and channel, sorted by time.
 
-    Saturated samples are left out. The example continues that of
+    Saturated samples are left out. The example continues the one in
     [`jaxcam.fitting.fit`][].
 
     Args:

@@ -65,9 +65,9 @@ class Trained(NamedTuple):
     values: Any
     """The trained field, or tuple of fields."""
     before: float
-    """Cost before."""
+    """Cost before training."""
     after: float
-    """Cost after."""
+    """Cost after training."""
 
 
 def train(

@@ -94,7 +94,7 @@ def linearise(
 ) -> Linearised:
     """Return the score and information of all parameters about a fit.
 
-    The example continues that of [`jaxcam.fitting.fit`][].
+    The example continues the one in [`jaxcam.fitting.fit`][].
 
     Args:
         problem: The problem.

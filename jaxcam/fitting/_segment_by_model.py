@@ -37,19 +37,20 @@ def segment_by_model(
     restitution: float = 0.5,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Segments, ...]:
-    """Segment recordings at every gap of a model's system, as measured by its channels.
+    """Segment recordings at every gap of a model's system.
 
     A gap is computed from the measured components of the state and shifted so that it
     is zero where its velocity jumps, as far as the tolerances of the parameters allow.
-    Without a gap, the whole recording is one flight.
+    If the system has no gap, each recording is one flight.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
-    model describes most pieces but not one of them, impacts are sought in this piece
-    with a lower threshold, and a flight that follows contact begins later.
+    model describes most pieces but fails for one, that piece is searched for impacts
+    with a lower threshold. If its flight follows a contact, the flight is then taken to
+    begin at the last sample near the surface.
 
     Args:
-        model: The model. State components count as measured if a sensor without a
-            bandwidth has their index as `observe`.
+        model: The model. A state component counts as measured if a sensor without a
+            bandwidth has its index as `observe`.
         recordings: The recordings.
         parameters: Parameters to fit; their tolerances limit the error of a gap.
         drive_channel: The channel of the drive's encoder (rad), for a model with a

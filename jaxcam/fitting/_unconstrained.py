@@ -19,7 +19,7 @@ _MEMBER = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class Unconstrained:
-    """A combination of parameters that can change without changing the data."""
+    """A combination of parameters whose change does not affect the predicted data."""
 
     names: tuple[str, ...]
     """Names of the parameters; `name@record` if each recording has its own value."""

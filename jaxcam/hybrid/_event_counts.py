@@ -8,7 +8,7 @@ from .codes import RowKind
 
 
 class EventCounts(eqx.Module):
-    """Numbers of events of a motion, floats.
+    """Numbers of events of a motion, as floats.
 
     The impacts of a complete chatter sequence count as one contact.
     """
@@ -22,7 +22,7 @@ class EventCounts(eqx.Module):
     slides: Float[Array, ""]
     """Number of times that sliding begins."""
     recent: Float[Array, ""]
-    """Number of impacts since the last other event."""
+    """Number of impacts since the last event of another kind."""
 
     @staticmethod
     def zero() -> "EventCounts":

@@ -38,7 +38,7 @@ class Arrival(eqx.Module):
     code: Int[Array, ""]
     """Index into `RESULTS`; 0 if the run reached the end."""
     events: EventCounts
-    """Numbers of events on the way."""
+    """Numbers of events between start and end."""
     start: Bool[Array, " flags"]
     """Mode at the start, shape `(m + 2 k,)`: constraints in contact, then surfaces on
     whose negative side the motion starts, then surfaces along which it slides."""

@@ -73,8 +73,8 @@ def simulate(
             moves.
         solver: Explicit Runge-Kutta solver from diffrax; default: `Dopri8`.
         settings: All accuracy settings; overrides `tolerance` and `solver`.
-        max_step: Longest integration step (s); briefer forces or narrower barriers may
-            be stepped over.
+        max_step: Longest integration step (s). The solver may step over a force that is
+            briefer, or a barrier that is narrower, than one step.
         max_steps: Maximum number of attempted steps. The default is a million; inside
             `jit`, `vmap`, `jvp` or `grad`, where array sizes must be fixed, it is 4096
             with padded arrays.

@@ -112,7 +112,8 @@ def stroboscope(
         period: Sampling period (s); default: the system's forcing period.
         settings: Accuracy settings; the default completes chatter as soon as the theory
             allows.
-        block: Number of trajectories advanced together; each that ends is replaced.
+        block: Number of trajectories advanced together; a trajectory that ends is
+            replaced by the next one.
         rows: Number of attempted steps between two checks for ended trajectories.
         max_steps: Maximum number of attempted steps per trajectory.
         workers: Number of threads; results do not depend on it.

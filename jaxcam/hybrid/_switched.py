@@ -13,17 +13,18 @@ from ._types import RealScalar, State
 class SwitchedSystem(HybridSystem):
     """A system whose vector field changes when the state crosses a surface.
 
-    Subclass it and define two methods. `switching` returns one function per switching
+    Subclass it and define two methods. `switching` returns one switching function per
     surface, which is zero on the surface; `branch` returns the rate of change of the
-    state for given sides of the surfaces, +1 where the function is positive and -1
-    where it is negative. Each branch must remain smooth slightly beyond its surfaces.
-    The event loop locates a crossing as accurately as an impact, ends the step there
-    and continues with the other branch. A spring force with a corner, backlash or a
-    relay therefore causes no loss of accuracy, and crossings have exact derivatives.
+    state for given sides of the surfaces, +1 where the switching function is positive
+    and -1 where it is negative. Each branch must remain smooth slightly beyond its
+    surfaces. The event loop locates a crossing as accurately as an impact, ends the
+    step there and continues with the other branch. A spring force with a corner,
+    backlash or a relay therefore causes no loss of accuracy, and crossings have exact
+    derivatives.
 
     There are no constraints by default; define `gap` and `impact` if the system also
-    has impacts. `hysteresis` makes a surface switch like a relay, and `reset` makes the
-    state jump at a crossing. If both branches point towards a surface, the motion
+    has impacts. With `hysteresis`, a surface switches like a relay; with `reset`, the
+    state jumps at a crossing. If both branches point towards a surface, the motion
     slides along it until one of them points away; with dry friction, the body sticks.
     `holding` is then the ratio of static to kinetic friction. `contact_friction` adds
     Coulomb friction to constraints.
@@ -109,7 +110,7 @@ class SwitchedSystem(HybridSystem):
     def hysteresis(self) -> Any:
         """Return how far a switching function passes beyond zero before it switches.
 
-        It is a number, or has shape `(k,)`; the default is zero. A motion on the
+        The result is a number or has shape `(k,)`; the default is zero. A motion on the
         positive side switches where the function falls to -hysteresis, and a motion on
         the negative side where it rises to +hysteresis, as in a relay.
         """
@@ -119,8 +120,9 @@ class SwitchedSystem(HybridSystem):
     def holding(self) -> Any:
         """Return the ratio of static to kinetic friction at each surface.
 
-        It is the limit of the friction force at zero slip divided by the friction force
-        in the branches: at least one, a number or of shape `(k,)`; default: one.
+        This is the largest friction force at zero slip divided by the friction force in
+        the branches. The ratio must be at least one; it is a number or has shape
+        `(k,)`, and the default is one.
         """
         return 1.0
 
@@ -132,16 +134,18 @@ class SwitchedSystem(HybridSystem):
 
         `"kinematic"` (Newton, the default): ratio of the normal velocities after and
         before the impact. `"kinetic"` (Poisson): ratio of the normal impulses in
-        restitution and in compression. `"energetic"` (Stronge): root of the ratio of
-        the works of the normal force; only then can an impact never increase the
-        energy. They differ if friction changes the normal velocity and the slip stops
-        or reverses during the impact. `"complementarity"` (Moreau): ratio of the normal
-        velocities, and all of the friction acts against the slip after the impact, as
-        in time-stepping schemes; it differs if the slip reverses.
+        restitution and in compression. `"energetic"` (Stronge): square root of the
+        ratio of the work of the normal force in restitution to that in compression;
+        only with this definition can an impact never increase the energy. These three
+        definitions differ if friction changes the normal velocity and the slip stops or
+        reverses during the impact. `"complementarity"` (Moreau): ratio of the normal
+        velocities, with all of the friction acting against the slip after the impact,
+        as in time-stepping schemes; the result differs if the slip reverses.
 
-        An impact while other gaps are closed is an impact on all of them (up to three
-        constraints, more than three states): with Newton's coefficient for
-        `"kinematic"` and `"complementarity"`, otherwise with Poisson's.
+        An impact while other gaps are closed is treated as an impact on all of these
+        constraints, in systems with up to three constraints and more than three states:
+        with Newton's coefficient for `"kinematic"` and `"complementarity"`, otherwise
+        with Poisson's.
         """
         return "kinematic"
 
@@ -150,7 +154,8 @@ class SwitchedSystem(HybridSystem):
         """Return whether the contacts have friction: whether the class defines
         `contact_friction`.
 
-        Override it in a class that passes on the method of another system.
+        Override this property in a class whose `contact_friction` calls that of another
+        system.
         """
         return type(self).contact_friction is not SwitchedSystem.contact_friction
 
@@ -162,14 +167,14 @@ class SwitchedSystem(HybridSystem):
 
         While a constraint is in contact, each unit of its normal force adds the impulse
         direction plus this vector to the rates of the state. For a body with friction
-        coefficient mu that slides along x, whose slip velocity is the first switching
-        function, only the rate of the velocity along x is not zero: `-mu * sides[0]`.
-        At zero slip the body sticks as long as the required friction force is less than
-        mu times the normal force. `impact` is then the law without friction, from which
-        the coefficient of restitution follows; `restitution_kind` determines its
-        meaning. During an impact, the body slips until friction has stopped it; then it
-        sticks, or slips back if friction is too weak. The friction of a constraint must
-        act against one switching function, its slip velocity.
+        coefficient mu that slides along x, with its slip velocity as the first
+        switching function, the only nonzero component is that of the velocity along x:
+        `-mu * sides[0]`. At zero slip the body sticks as long as the required friction
+        force is less than mu times the normal force. `impact` is then the law without
+        friction, from which the coefficient of restitution follows; `restitution_kind`
+        determines its meaning. During an impact, the body slips until friction has
+        stopped it; then it sticks, or slips back if friction is too weak. The friction
+        of a constraint must act against one switching function, its slip velocity.
 
         Args:
             t: Time (s).

@@ -13,9 +13,9 @@ class HybridSystem(eqx.Module):
     """A mechanical system with impacts: free flight between impacts on its constraints.
 
     Subclass it, define the three methods below, and declare the parameters as fields:
-    every floating-point field is a parameter that can be swept, fitted, continued and
-    differentiated, and that can be selected by a `where` function (`lambda s:
-    s.speed`).
+    every floating-point field is a parameter. A `where` function, such as
+    `lambda s: s.speed`, selects a parameter to sweep, to fit, to continue, or to
+    differentiate with respect to.
 
     All three methods take the time `t` (seconds, a scalar) and the state (shape
     `(n,)`), must be smooth in both, and are written with `jax.numpy`. With one
@@ -109,9 +109,9 @@ class HybridSystem(eqx.Module):
         The shape is `(k,)`. Steps end exactly at these times, so within a step the
         vector field, gap and impact law are evaluated on only one side of each, and a
         switch may be written with `jnp.where(t < b, ...)`. In a system with a `period`,
-        they repeat in every period, at `b + k * period`.
-        Declare a brief force by the times at which it begins and ends. Keep the number
-        small, because each time adds operations to every step.
+        these times repeat in every period, at `b + k * period`. Declare a brief force
+        by the times at which it begins and ends. Keep the number small, because each
+        time adds operations to every step.
         """
         return None
 
@@ -123,8 +123,9 @@ class HybridSystem(eqx.Module):
     def prepared(self) -> "HybridSystem":
         """Return an equivalent system that is cheaper to evaluate many times.
 
-        It is called once before a simulation, and derivatives pass through it. For
-        example, a cam profile is replaced here by its Fourier coefficients.
+        This method is called once before each simulation, and derivatives are
+        propagated through it. For example, a cam profile is replaced here by its
+        Fourier coefficients.
 
         Returns:
             The equivalent system; by default, the system itself.

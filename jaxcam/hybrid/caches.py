@@ -46,11 +46,11 @@ class Cache:
 
 
 def clear_caches() -> None:
-    """Forget all programs that jaxcam and JAX have compiled in this process.
+    """Discard all programs that jaxcam and JAX have compiled in this process.
 
-    Call it after you have replaced a method of a class, or a value that a method reads
-    from outside, since compiled programs contain the old one. Programs on disk remain;
-    they are found by their content.
+    Call this function after you have replaced a method of a class, or a global value
+    that a method reads, because compiled programs still contain the old one. Programs
+    on disk are kept, because they are looked up by their content.
 
     Examples:
         >>> import jaxcam

@@ -1,4 +1,4 @@
-"""Detect invalid input before anything is compiled; each message names the fix."""
+"""Detect invalid input before anything is compiled; each message states the remedy."""
 
 import hashlib
 

@@ -16,12 +16,12 @@ _EXACT = 1e-13
 def superstable(
     system: eqx.Module, where: Callable, critical, first: tuple, count: int
 ) -> Float[np.ndarray, " count"]:
-    """Return parameters at which the critical point has period 1, 2, 4, ..., 2^(count -
-    1).
+    """Return the parameter values at which the critical point has period 1, 2, 4, ...,
+    2^(count - 1).
 
-    There is one such parameter in each window of the cascade, and they accumulate at
-    the same rate as its period doublings. Each is found by Newton's method, starting
-    from an extrapolation of the previous ones.
+    There is one such value in each window of the cascade, and these values accumulate
+    at the same rate as the period doublings. Each value is found by Newton's method,
+    starting from an extrapolation of the previous ones.
 
     Args:
         system: The map, a module.

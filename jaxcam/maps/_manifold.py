@@ -86,10 +86,11 @@ def grow_manifold(
 ) -> Float[np.ndarray, "points 2"]:
     """Return one side of the unstable manifold of a saddle, as a curve from the saddle.
 
-    It consists of a short segment along the unstable direction and its images. Points
-    are added to the first segment wherever their images are too far apart, so that
-    every point of the curve is an exact image of a point on the segment, and folds are
-    resolved. For the stable manifold, pass the inverse map.
+    The curve consists of a short segment along the unstable direction and the images of
+    that segment. Points are added to the segment wherever the images of neighbouring
+    points are too far apart, so that every point of the curve is an exact image of a
+    point on the segment, and folds are resolved. For the stable manifold, pass the
+    inverse map.
 
     Args:
         system: The map, traceable by JAX.
@@ -106,7 +107,7 @@ def grow_manifold(
             together there.
 
     Raises:
-        ValueError: The direction is not stretched by the map.
+        ValueError: The map does not stretch the direction.
 
     Examples:
         >>> from jaxcam.maps import grow_manifold

@@ -63,6 +63,6 @@ NORMAL_FORMS: dict[str, NormalForm] = {
     ),
 }
 """The normal forms of Figure 2.7 of the thesis. The map printed there for period
-doubling, (1 + mu) x - x^3, has its multiplier at +1, which is a pitchfork bifurcation;
-with the opposite sign, the map has a period doubling.
+doubling, (1 + mu) x - x^3, has a multiplier of +1 at the bifurcation, so it undergoes a
+pitchfork bifurcation; with the opposite sign, the map undergoes a period doubling.
 """

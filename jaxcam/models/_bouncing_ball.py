@@ -32,7 +32,7 @@ class BouncingBall(HybridSystem):
     """Units of the state components."""
 
     gravity: jax.Array = parameter(9.81)
-    """Acceleration of free fall (m/s^2)."""
+    """Acceleration due to gravity (m/s^2)."""
     restitution: jax.Array = parameter(0.8)
     """Coefficient of restitution, between 0 and 1."""
     amplitude: jax.Array = parameter(0.0)

@@ -13,7 +13,7 @@ class DryFrictionOscillator(SwitchedSystem):
     """Forced oscillator with dry friction, dimensionless.
 
     `x'' + x = amplitude cos(omega t) - friction sgn(x')`; the state is (x, x'). At x' =
-    0 the body sticks until the force on it reaches `static` times `friction`. Without
+    0, the body sticks until the force on it reaches `static` times `friction`. Without
     forcing, each half cycle lasts pi and reduces the amplitude by `2 friction`.
 
     J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction,
@@ -37,7 +37,7 @@ class DryFrictionOscillator(SwitchedSystem):
     omega: jax.Array = parameter(0.5)
     """Angular frequency of the forcing."""
     friction: jax.Array = parameter(0.3)
-    """Friction force of the moving body, in units of the spring force at x = 1."""
+    """Kinetic friction force, in units of the spring force at x = 1."""
     amplitude: jax.Array = parameter(1.0)
     """Amplitude of the forcing."""
     static: jax.Array = parameter(1.0)

@@ -13,8 +13,8 @@ class ForcedOscillator(eqx.Module):
 
     `u'' + 2 damping u' + stiffness u = amplitude cos(omega t)` (thesis, eq. 2.4), on
     the cylinder: the state is (u, u', time within the period), and the last component
-    is periodic with 2 pi / omega. (The thesis has cos(x3) in its eq. 2.5, which is
-    valid for omega = 1.)
+    has the period 2 pi / omega. (The thesis has cos(x3) in its eq. 2.5, which is valid
+    for omega = 1.)
 
     Examples:
         >>> from jaxcam.models import ForcedOscillator

@@ -18,11 +18,11 @@ from ._parameters import (
 class InclinedShaker(SwitchedSystem):
     """A block that slides, sticks and bounces on a vibrating inclined plane.
 
-    The plane moves by `amplitude sin(omega t)` at the angle `direction` to itself. The
-    state is (downhill position, height, and their velocities), relative to the plane.
-    In contact the friction force is at most `friction_coefficient` times the normal
-    force, and `static` times that while the block sticks; in an impact, its impulse is
-    at most `friction_coefficient` times the normal impulse.
+    The plane moves by `amplitude sin(omega t)` along a line at the angle `direction` to
+    the plane. The state is (downhill position, height, and their velocities), relative
+    to the plane. In contact, the friction force is at most `friction_coefficient` times
+    the normal force, and `static` times that while the block sticks; in an impact, the
+    friction impulse is at most `friction_coefficient` times the normal impulse.
 
     I. I. Blekhman, Vibrational Mechanics, World Scientific (2000).
 
@@ -59,7 +59,7 @@ class InclinedShaker(SwitchedSystem):
     omega: jax.Array = parameter(50.0)
     """Angular frequency of the vibration (rad/s)."""
     direction: jax.Array = parameter(0.5)
-    """Angle of the vibration to the plane (rad)."""
+    """Angle between the direction of vibration and the plane (rad)."""
     gravity: jax.Array = parameter(9.81)
     """Acceleration due to gravity (m/s^2)."""
 

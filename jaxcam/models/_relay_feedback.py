@@ -38,12 +38,12 @@ class RelayFeedback(FilippovSystem):
             )
 
     def above(self, t, state) -> jax.Array:
-        """Return the rates while the relay gives -1."""
+        """Return the rates while the relay output is -1."""
         del t
         return self.matrix @ state - self.input
 
     def below(self, t, state) -> jax.Array:
-        """Return the rates while the relay gives 1."""
+        """Return the rates while the relay output is 1."""
         del t
         return self.matrix @ state + self.input
 

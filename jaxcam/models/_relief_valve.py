@@ -20,7 +20,7 @@ class ReliefValve(HybridSystem):
     The state is (lift, lift rate, pressure): `x'' + damping x' + x + preload =
     pressure`, and `pressure' = compressibility (flow - x sqrt(pressure))`. The seat is
     at lift zero. When the flow falls below a Hopf point, the valve begins to oscillate;
-    when the amplitude reaches the seat, it impacts.
+    when the oscillation reaches the seat, the valve hits it.
 
     G. Licsko, A. Champneys and C. Hos, Nonlinear analysis of a single stage pressure
     relief valve, IAENG International Journal of Applied Mathematics 39 (2009).

@@ -19,9 +19,9 @@ class RockingBlock(HybridSystem):
         (4/3) R q'' = -g s sin(alpha - s q) - a cos(alpha - s q),
 
     with the sign s of q, the acceleration a of the floor, the half diagonal R, and
-    tan(alpha) = `half_width / half_height`. At each change of corner, the rate falls by
-    the factor `restitution`. Impacts of a block that ceases to rock accumulate; then
-    it stands on both corners until `|a|` exceeds g tan(alpha).
+    tan(alpha) = `half_width / half_height`. At each change of corner, the rate of the
+    angle is multiplied by `restitution`. As the rocking dies out, the impacts
+    accumulate; the block then stands on both corners until `|a|` exceeds g tan(alpha).
 
     The state is (angle, lift, angle rate, lift rate). The lift is the angle's absolute
     value while a corner is in contact; the gaps of the left and the right corner are
@@ -29,10 +29,11 @@ class RockingBlock(HybridSystem):
     rate.
 
     At small angles, the corner stays on the floor as long as `|a|` is below
-    (1 + restitution) / (1 - restitution) g tan(alpha); beyond, it leaves the floor, as
-    that of a real block does if `restitution` is `housner_restitution`. The contact
-    forces are those of a real block, divided by its mass and `half_width`, only while
-    it stands. A block that has fallen over is not stopped by the floor.
+    (1 + restitution) / (1 - restitution) g tan(alpha); above this limit, the corner
+    leaves the floor, as the corner of a real block does if `restitution` is
+    `housner_restitution`. The contact forces are those of a real block, divided by its
+    mass and `half_width`, only while the block stands. A block that has fallen over is
+    not stopped by the floor.
 
     G. W. Housner, The behavior of inverted pendulum structures during earthquakes,
     Bulletin of the Seismological Society of America 53 (1963); S. J. Hogan, On the
@@ -63,12 +64,13 @@ class RockingBlock(HybridSystem):
     half_height: jax.Array = parameter(0.4)
     """Half the height of the block (m)."""
     restitution: jax.Array = parameter(0.9)
-    """Angle rate after a change of corner divided by that before it, above 0 and below
-    1; see `housner_restitution`."""
+    """Ratio of the angle rates after and before a change of corner, above 0 and below
+    1; see `housner_restitution`.
+    """
     amplitude: jax.Array = parameter(0.0)
-    """Amplitude of the acceleration of the floor (m/s^2); default: at rest."""
+    """Amplitude of the acceleration of the floor (m/s^2); default: floor at rest."""
     omega: jax.Array = parameter(6.0)
-    """Angular frequency of the floor (rad/s)."""
+    """Angular frequency of the floor motion (rad/s)."""
     gravity: jax.Array = parameter(9.81)
     """Acceleration due to gravity (m/s^2)."""
 
@@ -118,15 +120,15 @@ class RockingBlock(HybridSystem):
 
     @property
     def housner_restitution(self) -> jax.Array:
-        """Factor of the rate at a change of corner without slip and rebound, 1 - (3/2)
-        sin(alpha)^2.
+        """Value of `restitution` for a change of corner without slip or rebound, 1 -
+        (3/2) sin(alpha)^2.
         """
         diagonal = self.half_width**2 + self.half_height**2
         return 1 - 1.5 * self.half_width**2 / diagonal
 
     @property
     def period(self) -> jax.Array:
-        """Period of the floor (s)."""
+        """Period of the floor motion (s)."""
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:

@@ -17,10 +17,11 @@ from ._parameters import (
 class SpinningBall(SwitchedSystem):
     """A ball that bounces, slides and rolls on a floor.
 
-    The state is (position, height, velocity, vertical velocity, spin); a ball that
-    rolls has the spin velocity / radius. The force and the impulse of friction are at
-    most `friction_coefficient` times those of the floor. A solid ball that starts to
-    slide without spin rolls after `2 v / (7 mu g)`, with 5/7 of its velocity.
+    The state is (position, height, velocity, vertical velocity, spin); a rolling ball
+    has the spin `velocity / radius`. The friction force and the friction impulse are at
+    most `friction_coefficient` times the normal force and the normal impulse of the
+    floor. A solid ball that starts to slide with velocity v and without spin begins to
+    roll after `2 v / (7 mu g)`, with the velocity 5/7 v.
 
     R. Cross, Grip-slip behavior of a bouncing ball, American Journal of Physics 70
     (2002), 1093-1102.
@@ -49,7 +50,7 @@ class SpinningBall(SwitchedSystem):
     radius: jax.Array = parameter(0.02)
     """Radius (m)."""
     inertia: jax.Array = parameter(0.4)
-    """Moment of inertia over mass and radius squared: 2/5 for a solid ball."""
+    """Moment of inertia divided by mass and by radius squared: 2/5 for a solid ball."""
     friction_coefficient: jax.Array = parameter(0.3)
     """Coefficient of friction."""
     restitution: jax.Array = parameter(0.8)

@@ -45,7 +45,7 @@ class OnePiece(CamProfile):
 def simulate_through_joints(
     system: CamFollower | ValveTrain | DesmodromicCam, state, t0, t1, **options: Any
 ) -> Trajectory:
-    """Simulate a cam given by a motion program, including its joints exactly.
+    """Simulate a cam given by a motion program, with exact treatment of its joints.
 
     The run stops at every joint and continues with the next piece, so that each part is
     smooth. At a joint where the slope of the lift jumps up, a follower in contact has

@@ -19,7 +19,8 @@ from .cams import CamProfile
 
 
 class ValveTrain(AbstractCamDriven):
-    """A translating follower on a cam of constant speed: m x'' + c x' + k x + F0 = Fc.
+    """A translating follower on a cam that turns at constant speed: m x'' + c x' + k x
+    + F0 = Fc.
 
     Fc is the contact force. The state is the lift and velocity of the follower (m,
     m/s); the gap is the distance between the follower and the cam.

@@ -15,21 +15,21 @@ from ._parameters import (
 
 
 class WoodpeckerToy(SwitchedSystem):
-    """A sleeve on a vertical bar, and a bird that swings on it by a spring.
+    """A sleeve on a vertical bar, and a bird attached to the sleeve by a spring.
 
     The sleeve is wider than the bar: it tilts, jams at its upper or lower edge and
     holds the toy by friction, until the swinging bird frees it and the toy slides down.
-    At the end of its swing, the beak hits the bar.
+    At the end of each swing, the beak of the bird hits the bar.
 
     The state is (height of the sleeve, its angle, angle of the bird, and their
     velocities); a positive angle of the bird moves the beak towards the bar. The first
-    constraint is the beak, the others are the lower and the upper edge of the sleeve.
-    The beak has the coefficient of restitution `restitution`, the edges do not bounce;
-    all have the coefficient of friction `friction_coefficient`. The height does not
-    influence the motion.
+    constraint is the beak; the others are the lower and the upper edge of the sleeve.
+    The beak has the coefficient of restitution `restitution`, and the edges do not
+    bounce; all three have the coefficient of friction `friction_coefficient`. The
+    height does not influence the motion.
 
     The default values are those of Glocker's toy. The first simulation in a process
-    compiles for about a minute, unless its program is in JAX's cache on disk.
+    takes about a minute to compile, unless its program is in JAX's cache on disk.
 
     C. Glocker, Dynamik von Starrkörpersystemen mit Reibung und Stössen, thesis, TU
     München (1995), pp. 162 ff.; R. I. Leine, D. H. van Campen, C. Glocker, Nonlinear

@@ -25,11 +25,12 @@ class _Marker:
 
 @dataclass(frozen=True)
 class Pick:
-    """The parameters selected by a `where`, stored by their positions in the tree.
+    """The parameters selected by a `where` argument, stored by their positions in the
+    tree.
 
-    A `Pick` can be hashed, compared, and sent to another process. If it is called with
-    a tree of the same structure, it returns the leaf, or with `several` the tuple of
-    leaves, so it can be used wherever equinox takes a `where`.
+    A `Pick` can be hashed, compared, and sent to another process. Called with a tree of
+    the same structure, it returns the leaf, or a tuple of leaves if `several` is set.
+    It can therefore be used wherever equinox takes a `where`.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -59,7 +60,8 @@ class Pick:
 
 
 Where = Callable[[Any], Any] | str | tuple[Callable[[Any], Any] | str, ...] | Pick
-"""Selects a parameter: a function of the system, a dotted name, or several of those.
+"""Selects one or more parameters: a function of the system, a dotted name, a tuple of
+these, or a `Pick`.
 """
 
 
@@ -112,7 +114,7 @@ def pick(
 
 
 def unit_tangent(where: Where, tree: _Tree) -> _Tree:
-    """Return the direction in which one parameter grows, for `equinox.filter_jvp`.
+    """Return the unit tangent along one parameter, for `equinox.filter_jvp`.
 
     Args:
         where: Selects a parameter of the system: `lambda s: s.speed`, or its dotted

@@ -67,8 +67,8 @@ def branch_diagram(
         branches: One or several branches from `continuation.branch`.
         ax: Axes to draw on; default: a new figure.
         value: Function that returns the value or values of a point to draw against the
-            parameter; by default, the first component of the states once per forcing
-            period, if the points have them, otherwise of the solution.
+            parameter; by default, the first component of the states sampled once per
+            forcing period, or of the solution if a point has no such samples.
         x_label: Name and unit of the x-axis; default: the name of the parameter.
         y_label: Name and unit of the y-axis.
         x_scale: Factor applied to the parameter (30/pi for a speed in rpm).

@@ -19,7 +19,7 @@ def lambda_cobweb(r: float, ax: Axes | None = None, *, start=None) -> Figure:
         r: Coefficient of restitution.
         ax: Axes to draw on; default: a new figure.
         start: Initial values of lambda for the cobwebs; by default, one value on each
-            side of the fixed point, with complete and with interrupted chatter.
+            side of the fixed point, one with complete and one with interrupted chatter.
 
     Returns:
         The figure.

@@ -39,7 +39,7 @@ def chattering_picture(
         manifold: The manifold from [`variational.grazing_manifold`][].
         ax: Axes to draw on; default: a new figure.
         period: Forcing period (s).
-        most: Largest speed to draw; default: 1.3 times that of the region.
+        most: Largest speed to draw; default: 1.3 times the largest speed in the region.
 
     Returns:
         The figure, with rebound speed against time from release, modulo the period.

@@ -57,7 +57,7 @@ def sweep_diagram(
             sections that are not sampled once per period.
         x_label: Name and unit of the x-axis.
         y_label: Name and unit of the y-axis.
-        x_scale: Factor of the parameters (30/pi for a speed in rpm).
+        x_scale: Factor applied to the parameter (30/pi for a speed in rpm).
 
     Returns:
         The figure.
@@ -163,8 +163,8 @@ def sweep_chart(
         start: Index of the start, if there are several.
         x_label: Name and unit of the first parameter.
         y_label: Name and unit of the second parameter.
-        x_scale: Factor of the first parameter.
-        y_scale: Factor of the second parameter.
+        x_scale: Factor applied to the first parameter.
+        y_scale: Factor applied to the second parameter.
 
     Returns:
         The figure.

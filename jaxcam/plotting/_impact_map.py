@@ -33,7 +33,7 @@ def impact_return_map(
 
     The first panel shows the impact times, the second the approach speeds (the normal
     speeds just before the impacts). A point on the diagonal is an impact that repeats
-    itself.
+    the previous one.
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.
@@ -41,7 +41,8 @@ def impact_return_map(
         against: "phase" for the phase of the forcing (rad, from 0 to 2 pi), or "time"
             for the time itself (s), which is also used if there is no period.
         period: Forcing period (s); default: that of the system.
-        between: Time span to draw (s), for example without a transient.
+        between: Time span to draw (s), for example to omit a transient; default: the
+            entire trajectory.
 
     Returns:
         The figure.

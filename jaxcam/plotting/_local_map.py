@@ -25,9 +25,9 @@ def local_map(
 
     Args:
         local: The fitted map from [`variational.fit_local_map`][].
-        lobes: The simulated lobes, drawn as dots, but only if there is no shift.
+        lobes: The simulated lobes, drawn as dots if `shift` is zero.
         ax: Axes to draw on; default: a new figure.
-        shift: Distance by which the map is shifted to the left, representing the effect
+        shift: Distance by which the map is shifted to the left, to represent the effect
             of a parameter.
         turns: Number of iterations of the cobweb, the first half of which is not drawn.
 

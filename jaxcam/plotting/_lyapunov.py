@@ -10,7 +10,9 @@ from ._style import BAND, styled
 
 @styled
 def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
-    """Draw the exponents over the first periods, with their standard errors.
+    """Draw the exponents against the averaging time.
+
+    Bands show the final values with their standard errors.
 
     Args:
         spectrum: Spectrum of one motion from `variational.lyapunov_spectrum`.

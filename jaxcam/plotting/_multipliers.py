@@ -21,7 +21,8 @@ def multipliers(
             branch.
         ax: Axes to draw on; default: a new figure.
         reach: Limit of both axes, which extend from `-reach` to `reach`; by default,
-            all multipliers are inside. Multipliers outside are marked at the edge.
+            large enough for all multipliers. Multipliers outside are marked at the
+            edge.
 
     Returns:
         The figure.

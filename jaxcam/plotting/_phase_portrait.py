@@ -32,8 +32,8 @@ def phase_portrait(
         ax: Axes to draw on; default: a new figure.
         components: Components to draw along x and y.
         period: Time between stroboscopic points (s); default: the forcing period;
-            without either, no points are drawn.
-        phase: Time from `t0` to one of these points (s).
+            if there is neither, no points are drawn.
+        phase: Time from `t0` to one of the stroboscopic points (s).
         between: Time span to draw (s); default: the entire trajectory.
         samples: Number of points of a curve, in addition to those that short flights
             need.

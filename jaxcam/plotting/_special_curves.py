@@ -31,7 +31,8 @@ def special_curves(
     """Draw curves of special points in the plane of two parameters.
 
     Each kind of point has the same colour as on a branch. Points of codimension two on
-    the curves, and crossings with other curves that were found, are marked and named.
+    the curves, and the crossings that were found with other curves, are marked and
+    named.
 
     Args:
         curves: One or several curves from `continuation.curve`, all in the same

@@ -59,7 +59,7 @@ def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write a figure to a file, in the resolution of the style, and close it.
+    """Write a figure to a file, at the resolution of the style, and close it.
 
     The folder is created if it does not exist; the suffix of the name determines the
     format.

@@ -25,7 +25,8 @@ def time_history(
 ) -> Figure:
     """Draw each component of the state, and the gap, against time.
 
-    Impacts are dots on the curves and thin dashed jumps; contacts are shaded.
+    Impacts are shown as dots on the curves, jumps as thin dashed lines, and contacts as
+    shaded intervals.
 
     Args:
         trajectory: A trajectory of `jaxcam.simulate`.

@@ -5,7 +5,7 @@ from ..tables import scaled as scaled
 
 
 def labelled(name: str, unit: str) -> str:
-    """Return `name (unit)`; a dimensionless quantity has the unit -.
+    """Return `name (unit)`; a dimensionless quantity has the unit `-`.
 
     Args:
         name: Name of the quantity.

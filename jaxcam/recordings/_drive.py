@@ -35,15 +35,15 @@ class Drive:
     window: int
     """Number of samples in each smoothing parabola."""
     acceleration: DriveAcceleration
-    """Slower changes of the rate."""
+    """Angular acceleration, estimated over a longer time than the rate."""
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:
         """Return the time (s) at which a drive of constant `speed` has the measured
         angle.
 
-        A simulation at constant speed is compared on this clock, so that slow drift of
-        the drive is not attributed to a missing effect.
+        A simulation at constant speed is compared on this clock, so that a slow drift
+        of the drive speed is not attributed to a missing effect.
         """
         return (self.angle - self.phase) / self.speed
 

@@ -89,13 +89,13 @@ class References:
     spring_center: float = 0.27
     """Angle (rad) about which a nonlinear spring is symmetric."""
     impact_speed: float = 0.3
-    """Reference approach speed (rad/s) of a coefficient of restitution that decreases
-    with it.
+    """Reference speed (rad/s) of a coefficient of restitution that decreases with the
+    approach speed.
     """
     profile_lead: float = 0.7
     """Phase (rad) of an error of the cam profile with two periods per revolution."""
     stribeck_speed: float = 0.1
-    """Stribeck speed (rad/s), up to which friction is larger."""
+    """Stribeck speed (rad/s), below which friction is larger."""
     slip_speed: float = 0.015
     """Speed (rad/s) over which dry friction changes sign, far below the speeds of the
     motion; for friction that varies with position, `free_slip_speed` is used instead.
@@ -107,7 +107,7 @@ class References:
     def of_speed(cls, fast: float) -> "References":
         """Return the constants for a motion whose high speeds are about `fast`.
 
-        The ratio of each constant speed to those of the motion is the same as for the
+        Each reference speed has the same ratio to the speeds of the motion as for the
         thesis rig.
         """
         share, usual = fast / _FAST, cls()
@@ -120,7 +120,7 @@ class References:
         )
 
     def sharper(self, share: float) -> "References":
-        """Return the constants with the slip speeds of dry friction times a factor."""
+        """Return the constants with the slip speeds multiplied by `share`."""
         return dataclasses.replace(
             self,
             slip_speed=share * self.slip_speed,
@@ -161,7 +161,7 @@ class Rig:
     spring_hook_x: Quantity
     """x-coordinate of the spring's suspension point (m)."""
     spring_elongation: Quantity
-    """Elongation in the spring's torque (m)."""
+    """Length from which the elongation of the spring is measured (m)."""
     restitution: Quantity
     """Coefficient of restitution."""
     sensors: Sensors

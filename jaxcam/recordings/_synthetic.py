@@ -125,7 +125,7 @@ def record(
         duration: Length of the recording (s).
         rng: Random number generator for the noise.
         state: Initial state, `(n,)`; `None` for the release point.
-        settle: Time to wait before the recording (s).
+        settle: Time simulated before the recording begins (s).
         interval: Time between samples (s).
         drive: Noise and resolution (rad) of an encoder on the drive of a `Wandering`,
             recorded as `drive_channel`.
@@ -136,7 +136,7 @@ def record(
         A [`jaxcam.recordings.Recording`][].
 
     Raises:
-        RecordingError: The simulation did not reach its end.
+        RecordingError: The simulation stopped early.
 
     Examples:
         >>> from jaxcam.fitting import Sensor

@@ -35,8 +35,9 @@ def basins(
     """Compute basins of attraction: the attractor to which each state of a grid leads.
 
     Motions are simulated and sampled once per period. Periodic motions are on the same
-    attractor if their orbits are equal, other motions if they visit common cells. The
-    result does not depend on the order of the states, on the blocks or on the executor.
+    attractor if their orbits are equal; other motions are on the same attractor if they
+    visit common cells. The result does not depend on the order of the states, on the
+    blocks or on the executor.
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.
@@ -62,10 +63,10 @@ def basins(
         block: Number of rows along the first component of the grid computed together.
 
     Returns:
-        [`jaxcam.sweeps.Basins`][].
+        A [`jaxcam.sweeps.Basins`][].
 
     Raises:
-        ValueError: An argument is invalid; the message names the fix.
+        ValueError: An argument is invalid; the message states the remedy.
         RuntimeError: Workers were lost.
 
     Examples:

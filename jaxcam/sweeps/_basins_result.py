@@ -25,8 +25,8 @@ class Basins:
     `dataset` has one dimension for each component of the state, with the variables
     `attractor` (the number of the attractor to which each state leads, -1 if the motion
     escapes to infinity, -2 if the simulation failed, -3 if the state is inadmissible),
-    `impacts` and `turns` (see [`jaxcam.sweeps.attractors.Labels`][]). Along the
-    dimension `number` are the `name` and `orbit` of each attractor.
+    `impacts` and `turns` (see [`jaxcam.sweeps.attractors.Labels`][]). The variables
+    `name` and `orbit` describe each attractor, along the dimension `number`.
 
     Examples:
         >>> from jaxcam import sweeps
@@ -67,14 +67,14 @@ class Basins:
 
     @property
     def scale(self) -> np.ndarray:
-        """Scale of the motions, to which differences of orbits are relative, shape
+        """Scale of the motions, by which differences of orbits are divided, shape
         `(n,)`.
         """
         return np.array(json.loads(self.dataset.attrs[SWEEP])["scale"])
 
     @property
     def shares(self) -> dict[str, Share]:
-        """Fraction of the admissible states that leads to each attractor (basin
+        """Fraction of the admissible states that lead to each attractor (basin
         stability).
 
         The standard error sqrt(p (1 - p) / N) is that for states drawn at random (Menck

@@ -75,7 +75,7 @@ def chart(
         A [`jaxcam.sweeps.Chart`][].
 
     Raises:
-        ValueError: An argument is invalid; the message names the fix.
+        ValueError: An argument is invalid; the message states the remedy.
         RuntimeError: Workers were lost.
 
     Examples:

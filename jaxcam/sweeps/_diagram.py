@@ -67,7 +67,7 @@ def diagram(
         A [`jaxcam.sweeps.Diagram`][].
 
     Raises:
-        ValueError: An argument is invalid; the message names the fix.
+        ValueError: An argument is invalid; the message states the remedy.
         RuntimeError: Workers were lost.
 
     Examples:

@@ -45,9 +45,9 @@ def largest_exponents(
         states: States after the decay of transients, shape `(motions, n)`; NaN rows
             give NaN.
         turns: Number of periods to average over, at least 16.
-        where: As for a section; motions with the same second parameter are computed
-            together.
-        values: As for a section.
+        where: As for [`jaxcam.sweeps.sections.AbstractSection`][]; motions with the
+            same second parameter are computed together.
+        values: As for [`jaxcam.sweeps.sections.AbstractSection`][].
         progress: Called with the completed fraction.
 
     Returns:

@@ -27,7 +27,7 @@ class FollowedBasins(NamedTuple):
     numbers: tuple[np.ndarray, ...]
     """Consistent numbers of the attractors at each value."""
     shares: np.ndarray
-    """Fraction of the states that leads to each attractor, shape `(values, numbers)`; 0
+    """Fraction of the states that lead to each attractor, shape `(values, numbers)`; 0
     where it does not exist.
     """
     names: np.ndarray
@@ -55,9 +55,9 @@ def follow_basins(
         values: Values of the parameter, in the order to visit.
         grid: A [`jaxcam.sweeps.Grid`][] of initial states.
         turns: Number of periods simulated.
-        most: Distance between two orbits, in units of the first scale, beyond which
-            they are not the same attractor. Pairs are chosen to minimise the sum of the
-            distances; the label may change, for example from P(1,1) to P(2,2).
+        most: Distance between two orbits, in units of the scale of the motions, beyond
+            which they are not the same attractor. Pairs are chosen to minimise the sum
+            of the distances; the label may change, for example from P(1,1) to P(2,2).
         out: Folder in which a sweep is stored for each value.
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][], for one value at a
             time.

@@ -66,8 +66,9 @@ class Grid(eqx.Module):
         """Return the centres of the cells, with the last component varying fastest.
 
         Args:
-            first: First row of the first component.
-            last: Row of the first component before which to stop; default: all.
+            first: Index of the first cell along the first component.
+            last: Index of the cell along the first component before which to stop;
+                default: all cells.
 
         Returns:
             Shape `(motions, n)`.
@@ -84,7 +85,7 @@ class Grid(eqx.Module):
             states: States, shape `(motions, n)`.
 
         Returns:
-            Indices as in `states`, shape `(motions,)`.
+            Indices in the order of the method `states`, shape `(motions,)`.
         """
         states = np.asarray(states, dtype=float)
         sizes = np.where(self.sizes > 0, self.sizes, 1.0)

@@ -14,7 +14,7 @@ def load_sweep(path: str | Path) -> Diagram | Basins | Chart:
     """Load a stored sweep after verifying the checksums of all of its blocks.
 
     Without jaxcam, `xarray.open_dataset(path, engine="zarr", consolidated=False)` reads
-    the same data without checks.
+    the same data without verifying the checksums.
 
     Args:
         path: Folder of the sweep.

@@ -14,8 +14,8 @@ def monte_carlo(low, high, count: int, seed: int = 0, points: int | None = None)
         points: Number of parameter values, each with a separate set of states.
 
     Returns:
-        The states, shape `(count, n)` or `(points, count, n)`. The sets for the first
-            values do not depend on the number of values.
+        The states, shape `(count, n)` or `(points, count, n)`. A larger number of
+            `points` adds sets without changing the first ones.
 
     Raises:
         ValueError: The corners are inconsistent, or `count` is below one.

@@ -64,7 +64,7 @@ def reproduce(
         name: A key of [`jaxcam.thesis.TARGETS`][], such as "table-5.2".
         system: The rig, such as `jaxcam.models.preset("calibrated")`.
         size: "default", or "full" for diagrams and basins at the published resolution.
-        progress: Called with a sentence and the fraction done (or `None`).
+        progress: Called with a sentence and the completed fraction (or `None`).
 
     Returns:
         Columns quantity, printed, computed, unit, difference and relative (the

@@ -58,7 +58,7 @@ class Target:
     ) -> Figure | None:
         """Return the drawing in the current style; None for a table.
 
-        `progress` is called with a sentence and the fraction done (or `None`).
+        `progress` is called with a sentence and the completed fraction (or `None`).
         """
         if self.draw is None:
             return None

@@ -37,7 +37,8 @@ class SteppedMotion(NamedTuple):
     """Gaps, shape `(steps + 1, m)`."""
 
     def rests_from(self, constraint: int = 0) -> float:
-        """Return the time (s) from which there is contact in every step up to the end.
+        """Return the time (s) from which contact persists in every step to the end of
+        the run.
 
         If chatter ends in contact, this is the accumulation time to within a few steps.
 
@@ -63,13 +64,13 @@ def moreau(
     """Simulate from `t0` to `t1` in `steps` time steps without event detection
     (Moreau).
 
-    Each step integrates free flight by the midpoint rule. If it ends with a constraint
-    violated, the velocities jump at mid-step according to a complementarity
+    Each step integrates free flight by the midpoint rule. If the step ends with a
+    constraint violated, the velocities jump at mid-step according to a complementarity
     condition: each normal velocity at the end is at least that of the impact law, never
-    negative, and larger only if no impulse acts (after J. J. Moreau, Unilateral
-    contact and dry friction in finite freedom dynamics, 1988). Impacts, simultaneous
-    impacts, chatter and sticking all follow from this rule without tuning. The error,
-    and the penetration of constraints, is of first order in the step.
+    negative, and larger only if no impulse acts (after J. J. Moreau, Unilateral contact
+    and dry friction in finite freedom dynamics, 1988). Impacts, simultaneous impacts,
+    chatter and sticking all follow from this rule without tuning. The error and the
+    penetration of constraints are of first order in the step length.
 
     Args:
         system: The system.

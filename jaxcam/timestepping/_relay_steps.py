@@ -38,11 +38,11 @@ def relay_steps(
 ) -> RelayMotion:
     """Simulate a relay system from time zero to `t1` in `steps` backward Euler steps.
 
-    Switches are not located, and sliding requires no special handling: infinitely many
-    events in finite time take no more computing time than none. The error is of first
-    order in the step (M. K. Camlibel, W. P. M. H. Heemels, J. M. Schumacher,
-    Consistency of a time-stepping method for a class of piecewise-linear networks,
-    2002).
+    Switching times are not located, and sliding requires no special handling:
+    infinitely many events in finite time take no more computing time than none. The
+    error is of first order in the step length (M. K. Camlibel, W. P. M. H. Heemels, J.
+    M. Schumacher, Consistency of a time-stepping method for a class of piecewise-linear
+    networks, 2002).
 
     Args:
         system: The system.

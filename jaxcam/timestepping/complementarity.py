@@ -33,8 +33,8 @@ def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
 
     The method is Lemke's complementary pivoting with the lexicographic rule, which
     cannot cycle (R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity
-    Problem, 1992, section 4.4). If M is copositive-plus, a ray means that there is no
-    solution; for other M, it means that none was found.
+    Problem, 1992, section 4.4). If M is copositive-plus, termination on a ray means
+    that there is no solution; for other M, it means that no solution was found.
 
     Args:
         matrix: M, shape `(m, m)`.

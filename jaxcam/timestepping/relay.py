@@ -20,8 +20,8 @@ class RelaySystem(eqx.Module):
     """Linear system with relays: x' = A x + B u, y = C x + D u, where each u_i is the
     relay output for -y_i.
 
-    A relay gives 1 for y < 0, -1 for y > 0, and any value between for y = 0, as sliding
-    requires (thesis, eq. 3.1). D is zero by default.
+    A relay outputs 1 for y < 0, -1 for y > 0, and any value in between for y = 0, as
+    sliding requires (thesis, eq. 3.1). D is zero by default.
 
     Raises:
         ValueError: The shapes are inconsistent.
@@ -60,8 +60,8 @@ def relay_problem(
     """Solve y = M u + q, where each u_i is the relay output for -y_i (thesis, eq. 3.3).
 
     This is a complementarity problem of twice the size, between 1 + u and the positive
-    part of y, and between 1 - u and its negative part. Because u is bounded, it always
-    has a solution; the solution is unique if M is a P-matrix.
+    part of y, and between 1 - u and the negative part of y. Because u is bounded, the
+    problem always has a solution; the solution is unique if M is a P-matrix.
 
     Args:
         matrix: M, shape `(m, m)`.

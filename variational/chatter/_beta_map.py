@@ -77,9 +77,9 @@ def beta_map(lam, r) -> Float[Array, "..."]:
 
     Returns:
         Beta, dimensionless (thesis, eq. 6.97): 0 up to lambda_bar, then lobes between
-            square-root corners, each wider by 1/q and higher by 1/p^2 than the previous
-            one, with the scales p and q of [`variational.scaling_law`][] (thesis, eq.
-            6.49).
+            square-root corners, each wider than the previous one by the factor 1/q and
+            higher by the factor 1/p^2, with the scales p and q of
+            [`variational.scaling_law`][] (thesis, eq. 6.49).
 
     Examples:
         >>> from variational import beta_map

@@ -94,8 +94,8 @@ def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
 
     Args:
         system: A system with two states, one constraint and a period.
-        time: The first release at or after this time (s) is returned; it belongs to the
-            contact that ends before the maximum of the contact acceleration.
+        time: The first release at or after this time (s) is returned; this release ends
+            the contact that precedes the maximum of the contact acceleration.
 
     Returns:
         A [`variational.chatter.ChatterFrame`][]; NaN if there is no release in the

@@ -37,13 +37,16 @@ class ChatterOrbit(eqx.Module):
     """The motion from release to contact, and the accumulation of its chatter."""
 
     frame: ChatterFrame
-    """The release from which it starts; successive releases are one period apart."""
+    """The release from which the motion starts; successive releases are one period
+    apart.
+    """
     accumulation: Float[Array, ""]
     """Time at which the impacts accumulate (s); NaN if they do not accumulate before
     the last release.
     """
     complete: Bool[Array, ""]
-    """Whether they accumulate in the last of the given periods, and not earlier."""
+    """Whether the impacts accumulate in the last of the given periods, and not earlier.
+    """
     margin: Float[Array, ""]
     """Signed distance from the interruption in the last period. It is zero if
     accumulation and release coincide, negative if chatter is complete, and smooth in
@@ -51,8 +54,8 @@ class ChatterOrbit(eqx.Module):
     impacts, or if contact occurs in an earlier period.
     """
     impacts: Int[Array, ""]
-    """Number of impacts listed: for a complete sequence, those before the analytical
-    completion; for an interrupted sequence, all.
+    """Number of impacts: for a complete sequence, those before the analytical
+    completion; for an interrupted sequence, all of them.
     """
 
 
@@ -93,7 +96,8 @@ def chatter_accumulation(
     Args:
         system: A system with two states, one constraint and a period.
         time: As in [`variational.chatter_frame`][].
-        periods: Number of forcing periods from release to the release after sticking.
+        periods: Number of forcing periods from release to the next release after
+            sticking.
 
     Returns:
         A [`variational.chatter.ChatterOrbit`][].

@@ -166,17 +166,18 @@ class ComposedMap(eqx.Module):
 def composed_map(
     system: HybridSystem, where: Where, rank: int, phase=0.0
 ) -> ComposedMap:
-    """Compose the beta-map with the remainder of the period; all derivatives are
-    computed automatically.
+    """Compose the beta-map with the map over the rest of the period; all derivatives
+    come from automatic differentiation.
 
     Args:
         system: The system at the interruption ([`variational.chatter_interruption`][]).
         where: Selects the parameter.
         rank: Number of the impact D* after release, counted from 0. The later D* is,
             the better the lambda-map describes the following impacts, but the smaller
-            are the deviations for which A and C are linear: they must change the time
-            of D* by much less than tau*.
-        phase: Phase of the section, in periods; it must be in the flight after release.
+            the deviations for which the linear maps A and C are valid: a deviation must
+            change the time of D* by much less than tau*.
+        phase: Phase of the section, in periods; the section must lie in the flight
+            after release.
 
     Returns:
         A [`variational.chatter.ComposedMap`][].
@@ -263,8 +264,7 @@ def _compose(along, value, rank, phase) -> ComposedMap:
 def simulated_at_section(
     system: HybridSystem, composed: ComposedMap, speed
 ) -> SectionArrival:
-    """Compute the exact motion for which `ComposedMap.at_section` is the local
-    prediction.
+    """Compute the exact motion that `ComposedMap.at_section` predicts locally.
 
     Args:
         system: The system at the interruption.

@@ -63,7 +63,7 @@ def find_lobes(
     """Sample the stroboscopic map around the interruption and find its lobes.
 
     A lobe ends where the number of impacts changes; the ends are located to within
-    rounding (thesis, eq. 5.1).
+    rounding error (thesis, eq. 5.1).
 
     Args:
         system: A system as for [`variational.chatter_frame`][], near the interruption.

@@ -120,8 +120,8 @@ def chattering_region(
 
     The boundary C consists of impacts whose sequence accumulates exactly at release.
     Close to release, it is the parabola v = lambda_bar c tau^2, with the time tau from
-    release and the jerk c at release. It is invariant under the impact map, whose
-    inverse extends it backwards in time (thesis, eqs. 6.20 and 6.91).
+    release and the jerk c at release. The boundary is invariant under the impact map,
+    whose inverse extends it backwards in time (thesis, eqs. 6.20 and 6.91).
 
     Args:
         system: A system with two states, one constraint, a period and a positive

@@ -126,7 +126,7 @@ def impact_map(system: HybridSystem, time, speed, *, horizon=None):
 
     The map is exact; eq. 6.10 of the thesis is its first-order approximation at small
     speeds. The rebound speed is the normal velocity after the impact; v in the thesis
-    is that before it.
+    is the normal velocity before the impact.
 
     Args:
         system: A system with two states and one constraint.
@@ -165,8 +165,8 @@ def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
     """Return the derivative of the impact map P_I with respect to time and rebound
     speed.
 
-    Its determinant is r^2 v0/v1 times the change of phase volume in flight; it is
-    singular if the next impact grazes, v1 = 0 (thesis, eqs. 6.11-6.12).
+    Its determinant is r^2 v0/v1 times the change of phase volume in flight; the
+    derivative is unbounded if the next impact grazes, v1 = 0 (thesis, eqs. 6.11-6.12).
 
     Args:
         system: The system.

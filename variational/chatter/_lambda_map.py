@@ -48,7 +48,7 @@ def lambda_map(lam, r) -> Float[Array, "..."]:
 
     Returns:
         f, with a pole at 1/3, where the next impact is exactly at release; NaN above
-            3/8, where the motion does not return.
+            3/8, where the motion does not return to the surface.
 
     Examples:
         >>> from variational import lambda_map, scaling_law

@@ -57,7 +57,8 @@ class LocalMap(eqx.Module):
         """Evaluate the map: constant beyond the accumulation, otherwise lobe j (thesis,
         eq. 5.4).
 
-        It is NaN outside the first lobe, where the fit is not valid.
+        The result is NaN beyond `x_0`, the outer end of the first lobe, where the fit
+        is not valid.
         """
         width = 1 - jnp.exp(self.M)
         # sum of beta_k up to j - 1, solved for j

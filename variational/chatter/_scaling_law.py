@@ -30,8 +30,8 @@ def scaling_law(r) -> ScalingLaw:
 
     With s = sqrt(1 - 8 lambda / 3), the fixed point of the map in the thesis, eq. 6.36,
     is a root of 9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1). The other positive root
-    has p < 0: it corresponds to an impact after release and is not a fixed point of a
-    motion. Then p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
+    has p < 0: it corresponds to an impact after release, so it is not a fixed point of
+    an actual motion. Then p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
 
     Args:
         r: Coefficient of restitution of slow impacts, any shape.

@@ -34,8 +34,8 @@ class SectionArrival(eqx.Module):
     velocity: Float[Array, "..."]
     """Normal velocity at the section, more accurate than if computed from the state."""
     impacts: Int[Array, "..."]
-    """Number of impacts; for a complete sequence, those before the remainder is
-    negligible.
+    """Number of impacts; for a complete sequence, those before the remaining impacts
+    become negligible.
     """
     stuck: Bool[Array, "..."]
     """Whether the motion stuck."""
@@ -115,12 +115,12 @@ def to_section(
 
 
 def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
-    """Apply the stroboscopic map through chatter, from the state at a phase to that one
-    period later.
+    """Apply the stroboscopic map through chatter, from the state at a phase to the
+    state one period later.
 
-    It is accurate to rounding for any number and speed of impacts, unlike a simulation
-    that completes chatter near its interruption (thesis, eq. 5.1). The function is
-    pure: it can be compiled, batched and differentiated in forward mode.
+    The map (thesis, eq. 5.1) is accurate to rounding error for impacts of any number
+    and speed, unlike a simulation that completes chatter near its interruption. The
+    function is pure: it can be compiled, batched and differentiated in forward mode.
 
     Args:
         system: A system with two states, one constraint and a period.

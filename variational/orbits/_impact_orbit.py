@@ -43,7 +43,7 @@ class ImpactOrbit(eqx.Module):
         return Shooting(hit, self.periods, self.states.shape[1], self.steps)
 
     def unknowns(self, system: HybridSystem) -> Float[Array, " u"]:
-        """Return the unknowns of these equations.
+        """Return the unknowns of the shooting equations.
 
         Args:
             system: The system.

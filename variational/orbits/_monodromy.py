@@ -32,8 +32,8 @@ def monodromy(
             saltation matrices of the recorded events; "flow" differentiates the event
             loop. The first is accurate at every impact speed; the second loses one
             digit per decade of decreasing impact speed, because it has to locate the
-            impacts again. With switching surfaces, it is always the second.
-        settings: Accuracy of "flow"; the default tolerance is 1e-12.
+            impacts again. With switching surfaces, "flow" is always used.
+        settings: Accuracy of the method "flow"; the default tolerance is 1e-12.
 
     Returns:
         Shape `(n, n)`.
@@ -58,11 +58,12 @@ def turn_derivative(
     method: Method = "product",
     settings: Settings | None = None,
 ) -> TurnDerivative:
-    """Return the derivatives of the state after one period with respect to state,
-    period, phase and parameters.
+    """Return the derivatives of the state after one period with respect to the initial
+    state, period, phase and parameters.
 
     The period is held fixed when the parameters change; if the forcing period depends
-    on them, add `period` times its derivative.
+    on them, add the field `period` of the result times the derivative of the forcing
+    period.
 
     Args:
         system: The system.
@@ -70,7 +71,7 @@ def turn_derivative(
         where: Selects one or more parameters of the system, as for
             [`jaxcam.parameters.pick`][]; default: none.
         method: As for [`variational.monodromy`][].
-        settings: Accuracy of "flow"; the default tolerance is 1e-12.
+        settings: Accuracy of the method "flow"; the default tolerance is 1e-12.
 
     Returns:
         A [`variational.orbits.TurnDerivative`][].

@@ -115,9 +115,9 @@ def orbit_of(
     """Return the periodic orbit through `state` at `t0`, from a simulation of one
     period.
 
-    For an orbit without contact, the impacts are then refined as a boundary value
-    problem, so that the impacts and multipliers are accurate at every impact speed.
-    With switching surfaces, the event loop is differentiated instead.
+    For an orbit without contact, the impacts are then refined by solving a boundary
+    value problem, so that the impacts and multipliers are accurate at every impact
+    speed. With switching surfaces, the event loop is differentiated instead.
 
     Args:
         system: The system.

@@ -156,8 +156,8 @@ class AbstractShooting(eqx.Module):
     def segments(self, u, system: HybridSystem):
         """Return the starts and ends of the flights: times (s) and states.
 
-        The rows of padding repeat the first flight, so that all values are those of a
-        motion.
+        The rows of padding repeat the first flight, so that all rows belong to an
+        actual motion.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

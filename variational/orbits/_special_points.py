@@ -27,8 +27,8 @@ class SpecialPoint(eqx.Module):
     parameter: Float[Array, ""]
     """Value of the parameter, in its own unit."""
     orbit: ImpactOrbit
-    """The impacts of the orbit, after the grazing point if it has one; for a
-    detachment, the time and state of the contact.
+    """The impacts of the orbit, preceded by the grazing point if there is one; for a
+    detachment, the time and state at which contact is lost.
     """
 
 
@@ -63,9 +63,9 @@ def orbit_where(
     """Find the parameter value for which a function of the monodromy matrix is zero.
 
     Args:
-        system: The system, with the parameter near the point.
+        system: The system, with the parameter near the solution.
         where: Selects the parameter.
-        guess: The orbit near the point.
+        guess: An orbit near the solution.
         test: Function of the matrix of [`variational.orbits.orbit_monodromy`][].
 
     Returns:
@@ -152,15 +152,15 @@ def graze_of_orbit(
     The value is differentiable with respect to all other parameters. Grazing is an
     impact of zero speed; the square-root singularity of a grazing bifurcation belongs
     to the orbits beyond it, not to the grazing orbit. The function does not check that
-    the gap has a minimum there and is open elsewhere; see
+    the gap has a minimum at the grazing point and is positive elsewhere; see
     [`jaxcam.hybrid.surface.normal_acceleration`][].
 
     Args:
         system: The system, with the parameter near grazing.
         where: Selects the parameter.
         guess: The grazing point, followed by the impacts of the orbit in order, up to
-            one period later; only the grazing point for an orbit without impacts.
-            `constraints` gives the constraint that is touched, then those that are hit.
+            one period later; for an orbit without impacts, the grazing point alone.
+            `constraints` lists the grazed constraint, followed by those that are hit.
 
     Returns:
         The parameter and the orbit, which begins with the grazing point; NaN if
@@ -199,8 +199,8 @@ def detachment(
     Args:
         system: The system, with the parameter near the detachment.
         where: Selects the parameter.
-        t: Time near the weakest contact (s).
-        state: State near the weakest contact, shape `(2,)`.
+        t: Time near the detachment (s).
+        state: State near the detachment, shape `(2,)`.
         constraint: Index of the constraint.
 
     Returns:
@@ -229,9 +229,9 @@ def release_near(
 ) -> tuple[Float[Array, ""], Float[Array, " 2"]]:
     """Return the time and state of the release from contact near `t` and `state`.
 
-    It is the root of gap, normal velocity and acceleration, and is differentiable with
-    respect to all parameters. [`jaxcam.hybrid.surface.release_point`][] provides an
-    initial guess.
+    At release, gap, normal velocity and acceleration are zero. The result is
+    differentiable with respect to all parameters.
+    [`jaxcam.hybrid.surface.release_point`][] provides an initial guess.
 
     Args:
         system: The system.

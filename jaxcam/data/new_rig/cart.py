@@ -16,7 +16,7 @@ class Cart(HybridSystem):
 
     # parameters; cart.toml contains their values and tolerances
     stiffness: float = 40.0  # stiffness of the spring divided by the mass (1/s^2)
-    damping: float = 0.3  # divided by the mass (1/s)
+    damping: float = 0.3  # damping coefficient divided by the mass (1/s)
     left: float = -0.05  # positions of the stops (m)
     right: float = 0.06
     # speed after an impact divided by the speed before it
@@ -34,7 +34,7 @@ class Cart(HybridSystem):
     def gap(self, t, state):
         """Return the distance to each stop (m): positive when free, zero in contact.
 
-        With one stop, it is a number, and `impact` returns one state.
+        With a single stop, return one number here and one state from `impact`.
         """
         return jnp.stack([state[0] - self.left, self.right - state[0]])
 

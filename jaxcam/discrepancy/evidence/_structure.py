@@ -36,7 +36,7 @@ _TINY = 1e-300
 
 
 class Form(enum.StrEnum):
-    """The form of a structure that is searched for, as a string."""
+    """The form of a structure in the residuals, as a string."""
 
     TERM = "term"
     FUNCTION = "function"

@@ -116,7 +116,7 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
             f"{asked:.3g} is required"
         )
         if term.name in dropped:
-            reason += "; it is doubtful, see the caveat"
+            reason += "; the term is doubtful (see the caveat)"
         delta = trials.count([term.name]) * price - gain
         terms = tuple(sorted(names))
         yield Alternative("+".join(terms), delta, terms, reason)
@@ -132,8 +132,8 @@ def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
     if trial.bic < best.bic:
         return "fits better, but not all of its terms are certain"
     return (
-        f"explains less: its cost per sample is {trial.fit.cost / samples:.4g}, that "
-        f"of the choice {best.fit.cost / samples:.4g}"
+        f"explains less: its cost per sample is {trial.fit.cost / samples:.4g}, "
+        f"compared with {best.fit.cost / samples:.4g} for the choice"
     )
 
 

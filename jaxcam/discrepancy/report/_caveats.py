@@ -96,8 +96,8 @@ def differs(found: Differing, policy: Policy) -> Caveat:
         Reason.DIFFERING,
         f"The recordings differ: a separate {spelled(found.name)} for each of them "
         f"({said}) explains {percent(found.share)} of the squared residual above the "
-        f"noise and leaves {ratio(found.left)} times the noise. What this parameter "
-        "represents has changed between the recordings.",
+        f"noise and leaves {ratio(found.left)} times the noise. The quantity that this "
+        "parameter represents has changed between the recordings.",
         (found.name,),
     )
 
@@ -121,8 +121,8 @@ def above_noise(held: HeldOut, named: bool) -> Caveat:
     return Caveat(
         Reason.ABOVE_NOISE,
         f"On held-out data the residual of the model is {ratio(held.after)} times the "
-        f"sensor noise (that of the textbook model: {ratio(held.before)} times): the "
-        "model is incomplete, or the noise is larger than stated.",
+        f"sensor noise ({ratio(held.before)} times for the textbook model): the model "
+        "is incomplete, or the noise is larger than stated.",
     )
 
 
@@ -133,8 +133,8 @@ def poor_prediction(held: HeldOut) -> Caveat:
     return Caveat(
         Reason.POOR_PREDICTION,
         "Part of the data does not determine the parameters well enough to predict "
-        f"the rest: the residual is {ratio(held.after)} times the noise, that of the "
-        f"textbook model {ratio(held.before)} times. Record at more speeds.",
+        f"the rest: the residual is {ratio(held.after)} times the noise, compared with "
+        f"{ratio(held.before)} times for the textbook model. Record at more speeds.",
     )
 
 
@@ -143,8 +143,8 @@ def small_remainder(choice: Choice, share: float) -> Caveat:
     first = choice.unexplained[0]
     return Caveat(
         Reason.SMALL_REMAINDER,
-        f"A small discrepancy remains ({first.sentence}, {first.place}), "
-        f"{percent(share)} of the explained misfit: the form of the named effect may "
+        f"A small discrepancy remains ({first.sentence}, {first.place}); it amounts to "
+        f"{percent(share)} of the explained misfit. The form of the named effect may "
         "be slightly different.",
         tuple(sorted(choice.best.names)),
     )
@@ -206,8 +206,9 @@ def _beyond(outside: Outside) -> Caveat:
     return Caveat(
         Reason.BEYOND_TOLERANCE,
         f"The recordings determine only the sum of {label} and "
-        f"{spelled(name)}, {said}. The tolerance allows {ends}; the excess "
-        "is named, and its strength is only as accurate as the tolerance.",
+        f"{spelled(name)}, {said}. The tolerance allows {ends}; the excess is "
+        "attributed to the effect, so the strength of the effect is only as accurate "
+        "as the tolerance.",
         (name,),
     )
 
@@ -261,6 +262,6 @@ def _tie(best: Trial, other: Trial) -> Caveat:
         Reason.TIE,
         f"These recordings cannot distinguish {listed(sorted(best.names))} from "
         f"{written}: the BIC differs by only {other.bic - best.bic:.1f}. Record "
-        "motions of larger and smaller amplitude, and speeds further apart.",
+        "motions of larger and smaller amplitude, at speeds further apart.",
         names,
     )

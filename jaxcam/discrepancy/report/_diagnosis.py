@@ -146,14 +146,14 @@ class Diagnosis:
     ripple: Ripple | None
     """Speed ripple of the drive."""
     pulls: dict[str, tuple[float, float]]
-    """Deviation of each parameter from nominal, in tolerances: without and with the
-    effects.
+    """Deviation of each parameter from nominal, in units of its tolerance: without and
+    with the effects.
     """
     limits: dict[str, Value]
     """Detection limits: the smallest strength at which each term would have been named.
     """
     hides: dict[str, str]
-    """The parameter that would absorb most of each term."""
+    """For each strength, the rig parameter that would absorb most of it."""
     caveats: tuple[Caveat, ...]
     """Caveats, each a reason with its sentence."""
     policy: Policy = Policy()
@@ -167,8 +167,8 @@ class Diagnosis:
     `"contact"`; empty if the misfit is noise.
     """
     differing: Differing | None = None
-    """A parameter with separate values in the recordings, which explain most of the
-    residual of the chosen model; `differing.fit` is the fit with them.
+    """A parameter for which separate values in the recordings explain most of the
+    residual of the chosen model; `differing.fit` is the fit with these values.
     """
     location: tuple[str, str] | None = None
     """Names of the coordinate and of the gap on which the effects act; `None` for the
@@ -196,7 +196,13 @@ class Diagnosis:
             )
             for effect in self.effects
         ]
-        headings = ("effect", "parameters", "where", "BIC", "gain in held-out ln L")
+        headings = (
+            "effect",
+            "parameters",
+            "where",
+            "delta BIC",
+            "gain in held-out ln L",
+        )
         case = f"{self.case}: " if self.case else ""
         return ShortTable(f"{case}{self.summary}", headings, rows, headings[:3])
 
@@ -206,7 +212,7 @@ class Diagnosis:
         return tuple(effect.name for effect in self.effects)
 
     def model(self, record: int | str = 0) -> Model:
-        """Return the model with the missing effects, for use in every other command."""
+        """Return the model with the missing effects, for use in other functions."""
         model = self.after.model(record)
         if not isinstance(model.system, WithTerms):
             return model

@@ -45,8 +45,8 @@ _WORDS = {
     "step": "sets in at {x} {a}",
     "window": "acts only between {x} {a} and {b}",
     "bump": "acts only around {x} {a}, over about {width}",
-    "square": "grows with the square of the {x} from {middle}",
-    "cube": "grows with the cube of the {x} from {middle}",
+    "square": "grows with the square of the {x}, measured from {middle}",
+    "cube": "grows with the cube of the {x}, measured from {middle}",
     "exponential": "grows exponentially with the {x}, by a factor e over {reach}",
     "power": "grows as the {x} to the power {power}",
     "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
@@ -71,7 +71,7 @@ _WORDS = {
 _THINGS = {
     "force": "a force",
     "restitution": "a coefficient of restitution",
-    "surface": "a surface",
+    "surface": "a surface error",
     "sensor": "a sensor error",
 }
 # typical causes of a sensor error

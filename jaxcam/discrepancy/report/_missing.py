@@ -38,7 +38,7 @@ _FINER = 20
 _VERBS = {
     "force": "a force",
     "restitution": "a coefficient of restitution",
-    "surface": "a surface",
+    "surface": "a surface error",
     "sensor": "a sensor error",
 }
 _ARGUMENT_NAMES = {Variable.APPROACH: "speed"}

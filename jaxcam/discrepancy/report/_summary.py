@@ -58,10 +58,10 @@ def summary_of(
         return _difference(choice).strip()
     acts += _difference(choice)
     if not explained:
-        return f"The missing effect is none of the known ones: {acts}"
+        return f"The missing effect matches none of the known ones: {acts}"
     return (
         f"{percent(explained)} of the misfit is explained by {' and '.join(parts)}. "
-        f"The rest ({percent(1 - explained)}) is none of the known effects: {acts}"
+        f"The rest ({percent(1 - explained)}) matches none of the known effects: {acts}"
     )
 
 
@@ -124,10 +124,10 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
         break
     if fitted > policy.as_noise:
         return (
-            "No missing physics common to the recordings was detected. However, they "
-            "are not explained down to the sensor noise: the residual is "
-            f"{ratio(fitted)} times the noise and differs from recording to "
-            f"recording.{_difference(choice)}{tail}"
+            "No missing physics common to the recordings was detected. However, the "
+            "model does not explain the recordings down to the sensor noise: the "
+            f"residual is {ratio(fitted)} times the noise and differs from recording "
+            f"to recording.{_difference(choice)}{tail}"
         )
     if unseen > policy.as_noise:
         tail = (

@@ -76,8 +76,8 @@ def strength(
         default: Value of a new term.
         inner: Whether it has no effect while the strengths are zero, like an edge or a
             frequency. The fit starts from the best of the values that the term's
-            method `starts` returns; without any, the parameter must be a frequency
-            (Hz), which a scan finds.
+            method `starts` returns; if it returns none, the parameter must be a
+            frequency (Hz), which a scan finds.
 
     Returns:
         A field.
@@ -121,8 +121,8 @@ class Strength:
 
 
 class Term(eqx.Module):
-    """A physical effect that a model may lack. Subclass this and declare strengths with
-    `strength`.
+    """A physical effect that a model may lack. Subclass `Term` and declare strengths
+    with `strength`.
 
     A term with zero strengths has no effect. It acts in flight, on the surface, at
     impacts or on the sensor of the first coordinate if a subclass overrides

@@ -116,9 +116,9 @@ def invert_information(
 ) -> Float[np.ndarray, "g g"]:
     """Return the inverse of a positive semidefinite information matrix.
 
-    The matrix is scaled to a unit diagonal and inverted by its eigenvalues, which are
-    limited from below by their rounding error. An undetermined value (a zero on the
-    diagonal) has an infinite variance.
+    The matrix is scaled to a unit diagonal and inverted through its eigenvalues, each
+    of which is at least as large as their rounding error. An undetermined value (a zero
+    on the diagonal) has an infinite variance.
 
     Args:
         information: The matrix, shape `(g, g)`.
@@ -127,7 +127,7 @@ def invert_information(
         Shape `(g, g)`.
 
     Raises:
-        ValueError: The matrix is not finite, for example for a model with NaN.
+        ValueError: The matrix is not finite, for example because the model yields NaN.
     """
     if not np.all(np.isfinite(information)):
         raise ValueError(

@@ -30,11 +30,11 @@ class Layout(eqx.Module):
     """Prepares a model for many evaluations."""
 
     def at(self, values: Float[Array, " q"]) -> Model:
-        """Return the model with the parameters at some values."""
+        """Return the model with the given parameter values."""
         return self.placed([values[column] for column in range(len(self.places))])
 
     def placed(self, values: Sequence[Any]) -> Model:
-        """Return the model with the parameters at separate values."""
+        """Return the model with parameter values given as a sequence."""
         leaves, tree = jax.tree.flatten(self.model)
         for place, value in zip(self.places, values):
             leaves[place] = value
@@ -42,7 +42,7 @@ class Layout(eqx.Module):
 
     @program
     def about(self, values: Float[Array, " q"]) -> "Expansion":
-        """Return the model near some values."""
+        """Return the first-order expansion of the model about parameter values."""
         origin = self.at(values)
         given = jax.tree.leaves(self.model)
         leaves, tree = jax.tree.flatten(origin)

@@ -203,9 +203,9 @@ def chained(found: LinearPieces) -> Blocks:
 def cost_by_recording(costs: Costs, weights) -> Float[np.ndarray, " r"]:
     """Return the weighted cost of each recording.
 
-    A joint has the smaller weight of its two pieces. A contact whose surface is not
-    found has no cost, because it gives no information; data with zero weight have no
-    cost either.
+    A joint has the smaller of the weights of its two pieces. A contact whose surface is
+    not found has no cost, because it gives no information; data with zero weight have
+    no cost either.
 
     Args:
         costs: The costs.
@@ -227,8 +227,8 @@ def cost_by_recording(costs: Costs, weights) -> Float[np.ndarray, " r"]:
 
 
 def total_cost(costs: Costs, extras) -> float:
-    """Return the weighted cost of all pieces; a joint has the smaller weight of its two
-    pieces.
+    """Return the weighted cost of all pieces; a joint has the smaller of the weights of
+    its two pieces.
 
     Args:
         costs: The costs.

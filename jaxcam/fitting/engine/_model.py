@@ -111,9 +111,9 @@ class Turning(eqx.Module):
     phase field such that the drive angle is the measured angle plus the `phase` of the
     fitted system. This `phase` is therefore the offset of the drive angle from the
     encoder reading. A system whose vector field depends on the acceleration of the
-    drive, such as one on a base that the drive shakes, has a field for it that is
-    otherwise zero. Without this field, the effect of the acceleration is a random error
-    of the motion.
+    drive, such as one on a base that the drive shakes, needs a field for this
+    acceleration; its value is zero unless a recording is predicted. Without this field,
+    the effect of the acceleration is treated as a random error of the motion.
 
     Examples:
         >>> from jaxcam.fitting import Turning
@@ -135,7 +135,7 @@ class Turning(eqx.Module):
     """
 
     def at(self, system, t, drive: DriveState):
-        """Return the system with its drive in some motion at time `t`."""
+        """Return the system with its drive in a given motion at time `t`."""
         phase = self.phase(system) + drive.angle - drive.rate * t
         system = eqx.tree_at(
             lambda s: (self.speed(s), self.phase(s)), system, (drive.rate, phase)
@@ -165,7 +165,7 @@ class Input(eqx.Module):
     """Selects the field of the system, such as `lambda s: s.force`."""
 
     def at(self, system, t, drive: DriveState):
-        """Return the system with its input at a level."""
+        """Return the system with its input at a given level."""
         del t
         return eqx.tree_at(self.value, system, drive.angle)
 
@@ -180,8 +180,9 @@ class Input(eqx.Module):
 
 
 class Model(eqx.Module):
-    """A system with its sensors and its drive or input, from which parameters are
-    selected.
+    """A system with its sensors and its drive or input.
+
+    The `where` of each [`jaxcam.fitting.Parameter`][] selects a number in the model.
 
     Examples:
         >>> from jaxcam.fitting import Model, Sensor
@@ -220,7 +221,7 @@ class Model(eqx.Module):
     def during(self, middle, drive: DriveState) -> Callable[[Array], HybridSystem]:
         """Return the system as a function of time, within a step about `middle`.
 
-        A drive turns uniformly within a step, which the system itself expresses.
+        Within a step, a drive turns uniformly, so the system is the same throughout.
         """
         if isinstance(self.drive, Input):
             return self.drive.during(self.system, middle, drive)

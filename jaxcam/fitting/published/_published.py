@@ -102,7 +102,7 @@ def fit_published(
 
     Args:
         model: A system, or a module that contains one, at the nominal values.
-        where: Selects the free scalars; their nominal values centre the priors.
+        where: Selects the free scalars; the priors are centred on the nominal values.
         published: The data.
         names: Names of the free parameters.
         tolerances: Standard deviations of the priors; infinity for none.
@@ -114,7 +114,7 @@ def fit_published(
         A [`jaxcam.fitting.published.PublishedFit`][].
 
     Raises:
-        ValueError: Lengths differ, or a number is invalid.
+        ValueError: The lengths of arguments differ, or a number is invalid.
 
     Examples:
         >>> from jaxcam import fitting, models

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 class PublishedFit:
     """Result of [`jaxcam.fitting.fit_published`][].
 
-    - `estimates`, `stderr`, `covariance`: shapes `(p,)`, `(p,)`, `(p, p)`; including
-        the priors, with the stated errors of the data.
+    - `estimates`, `stderr`, `covariance`: shapes `(p,)`, `(p,)`, `(p, p)`; they
+        include the priors and use the stated errors of the data.
     - `chi_square`: chi-square of the data alone.
     """
 
@@ -136,7 +136,7 @@ class PublishedFit:
         )
 
     def numbers(self) -> "pd.DataFrame":
-        """Return published and computed values; the last column is in standard
+        """Return published and computed values, and their differences in standard
         errors.
         """
         import pandas as pd
@@ -155,11 +155,11 @@ class PublishedFit:
         )
 
     def weak(self, share: float = 0.5) -> list[str]:
-        """Return the combinations of parameters that are determined more by the priors
-        than by the data.
+        """Describe the combinations of parameters that the data determine poorly.
 
-        There is one sentence for each, the weakest first; `share` is the fraction of
-        the information that must come from the data.
+        These are the combinations for which the data provide less than the fraction
+        `share` of the information; the priors provide the rest. Each is described in
+        one sentence, the weakest first.
         """
         sentences = []
         for part, direction in zip(self.shares, self.directions, strict=True):

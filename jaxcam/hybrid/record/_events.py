@@ -15,7 +15,8 @@ class Impacts(Printed):
 
     Under a transformation (`jit`, `vmap`, `grad`), the arrays have a fixed length k:
     the first `count` entries are valid, later times are inf, and later states are NaN.
-    While a trajectory is assembled outside of transformations, they are NumPy arrays.
+    While a trajectory is assembled outside of transformations, NumPy arrays are used
+    instead.
     """
 
     time: Float[AnyArray, " k"]
@@ -43,8 +44,8 @@ class Impacts(Printed):
 class Contacts(Printed):
     """The intervals of sustained contact (sticking), in order; padded like `Impacts`.
 
-    A contact that lasts beyond the run has `released` False and ends at the end of the
-    run.
+    For a contact that lasts beyond the run, `released` is False and `end` is the end of
+    the run.
     """
 
     start: Float[AnyArray, " m"]
@@ -81,9 +82,10 @@ class SwitchKind(enum.IntEnum):
     CROSSES = 0
     """The motion crosses the surface."""
     SLIDES = 1
-    """It begins to slide along the surface; with dry friction, the body sticks."""
+    """The motion begins to slide along the surface; with dry friction, the body sticks.
+    """
     LEAVES = 2
-    """It leaves the surface along which it slid."""
+    """The motion leaves the surface along which it slid."""
 
 
 _SAID = {
@@ -96,8 +98,8 @@ _SAID = {
 class Switches(Printed):
     """The events at switching surfaces, in order; padded like `Impacts`.
 
-    An impact that ends sliding, because it moves the state off the surface, is only
-    among the impacts.
+    An impact that ends sliding, because it moves the state off the surface, is listed
+    only among the impacts.
     """
 
     time: Float[AnyArray, " k"]
@@ -105,8 +107,9 @@ class Switches(Printed):
     before: Float[AnyArray, "k n"]
     """State just before each event, shape `(k, n)`."""
     after: Float[AnyArray, "k n"]
-    """State just after it, different only where the surface has a `reset`, shape
-    `(k, n)`."""
+    """State just after each event, different only where the surface has a `reset`,
+    shape `(k, n)`.
+    """
     surface: Int[AnyArray, " k"]
     """Index of the surface, shape `(k,)`."""
     direction: Float[AnyArray, " k"]
@@ -114,8 +117,9 @@ class Switches(Printed):
     count: Int[AnyArray | np.integer, ""]
     """Number of events."""
     kind: Int[AnyArray, " k"]
-    """Kind of each event (`SwitchKind`): 0 crosses, 1 begins sliding, 2 leaves; shape
-    `(k,)`."""
+    """Kind of each event (`SwitchKind`): 0 for a crossing, 1 for the beginning of
+    sliding, 2 for its end; shape `(k,)`.
+    """
 
     def _batched(self) -> bool:
         return np.ndim(self.count) > 0

@@ -73,8 +73,8 @@ class Trajectory(Printed):
 
     @property
     def final(self) -> Float[Array, " n"]:
-        """State at the end of the run, shape `(n,)`; NaN under a transformation if it
-        failed.
+        """State at the end of the run, shape `(n,)`; NaN under a transformation if the
+        run failed.
         """
         if not is_traced(self):
             last = np.asarray(self.steps.state)[int(self.steps.count) - 1]
@@ -83,7 +83,7 @@ class Trajectory(Printed):
         return jnp.where(self.code == 0, last, jnp.nan)
 
     def at(self, times) -> Float[Array, "times n"]:
-        """Return the state at each of `times`, after any impact there.
+        """Return the state at each of `times`, after any impact at that time.
 
         Each sample is computed by one additional step of the same method from the last
         point before it, so it is differentiable and as accurate as the run itself.

@@ -83,7 +83,7 @@ def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
         system: The system.
         t: Time (s).
         x: State, shape `(n,)`.
-        contact: Which constraints are in contact, shape `(m,)`.
+        contact: Whether each constraint is in contact, shape `(m,)`.
 
     Returns:
         Rates of the state, shape `(n,)` (thesis, eq. 2.30).

@@ -25,8 +25,8 @@ _SLOW = 1e-8
 
 
 def impacts(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, "m n"]:
-    """Return the state after an impact at each constraint, one row for each; friction
-    included.
+    """Return the state after an impact at each constraint, including friction, with one
+    row per constraint.
 
     Args:
         system: The system.

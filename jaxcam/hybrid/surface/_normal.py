@@ -157,7 +157,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
     """Return the unit direction D of the impulse for each constraint.
 
     The result is exact if the normal velocity is zero: R(x) - x = W v vanishes with v,
-    so W follows from its derivative along the gradient of v.
+    so W follows from the derivative of R(x) - x along the gradient of v.
 
     Args:
         system: The system.

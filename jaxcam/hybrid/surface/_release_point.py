@@ -28,8 +28,7 @@ class ReleasePoint(eqx.Module):
 def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]:
     """Return the state of sustained contact at each of `times`.
 
-    It is determined by zero gap and zero normal velocity, and is computed by Newton's
-    method.
+    Newton's method finds the state for which the gap and the normal velocity are zero.
 
     Args:
         system: A system with two states and one constraint.
@@ -52,8 +51,8 @@ def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]
 def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " times"]:
     """Return the normal acceleration suppressed by contact at each of `times`.
 
-    Contact is maintained while it is negative; the body detaches if its maximum over
-    the period is positive.
+    Contact is maintained while this acceleration is negative; the body detaches if the
+    maximum of the acceleration over the period is positive.
 
     Args:
         system: A system with two states and one constraint.

@@ -22,7 +22,7 @@ class LawPiece(NamedTuple):
 class MotionLaw(NamedTuple):
     """A normalised rise from 0 to 1 as the fraction u of the segment goes from 0 to 1.
 
-    Laws of your own consist of the same pieces; the last one ends at 1.
+    Define a law of your own from such pieces; the last piece must end at 1.
     """
 
     name: str

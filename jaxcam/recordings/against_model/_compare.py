@@ -35,12 +35,13 @@ def compare(
         system: The model. A `CamFollower` is compared at the measured angle of its cam,
             regardless of its own speed.
         segments: The segmented recording.
-        observe: The channels as functions of the state: in `{"height_m": 0}`, the
-            number is the index of a component; a function of the state gives other
-            quantities. By default, the segmented channel is the first component.
+        observe: The channels to compare, each with the index of the state component
+            that it measures, as in `{"height_m": 0}`, or with a function of the state.
+            By default, the segmented channel measures the first component.
         noise: Standard deviations of the channels; by default measured from the
             recording.
-        clock: Time of the model at each sample (s).
+        clock: Time of the model at each sample (s); by default that of the segments,
+            or, for a `CamFollower`, the time at which its cam has the measured angle.
 
     Returns:
         A comparison.

@@ -131,7 +131,7 @@ class Comparison:
         return " ".join([". ".join(words) + ".", *self.notes])
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain numbers, strings and lists; missing numbers are `None`."""
+        """Return the comparison as plain data; missing numbers are `None`."""
         rows = [_plain(dataclasses.asdict(row)) for row in self.rows]
         return {"rows": rows, "sentence": self.sentence(), "notes": list(self.notes)}
 

@@ -104,7 +104,8 @@ def segment(
             upper one of two stops.
         upper_rate: Rate of change of `upper`.
         tolerance: Largest error of the stated position of each surface, in the units of
-            the channel; within it, the surface is shifted to the impacts.
+            the channel; each surface is shifted by at most this amount to match the
+            impacts.
         noise: Standard deviation of a sample; by default measured from the recording.
         restitution: Expected coefficient of restitution, for impacts too weak to be
             observed.

@@ -83,7 +83,7 @@ class Impacts:
     angle: Float[np.ndarray, " k"]
     """The measured channel at the impact."""
     angle_stderr: Float[np.ndarray, " k"]
-    """Standard error of its distance from the surface."""
+    """Standard error of the channel's distance from the surface."""
     turned: Float[np.ndarray, " k"]
     """Angle of the cam (rad); NaN without a drive."""
     before: Float[np.ndarray, " k"]
@@ -118,7 +118,9 @@ class Impacts:
 
     @property
     def restitution_stderr(self) -> Float[np.ndarray, " k"]:
-        """Standard error of `restitution`, from the errors of all three speeds."""
+        """Standard error of `restitution`, from the errors of the approach, separation
+        and surface speeds.
+        """
         r = self.restitution
         errors = [
             self.after_stderr,

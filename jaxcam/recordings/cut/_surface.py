@@ -43,7 +43,7 @@ class Surface(eqx.Module):
     """Sine amplitudes of the additional harmonics 2 and 3 (rad)."""
     bend: Float[Array, " waves"]
     """Amplitudes of a local deviation, such as a dent, that the harmonics cannot
-    describe; zero without one.
+    describe; zero if there is none.
     """
     covariance: Float[Array, " p p"]
     """Covariance of radius, eccentricity, centre, phase and amplitudes."""

@@ -86,10 +86,11 @@ def fit_surface(
 def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     """Refit the profile to the impacts and contacts in `Segments`.
 
-    Contacts count from the time at which the unobserved impacts have died out. Before
-    that time, the follower is on average above the cam: it is close to the cam, which
-    counts as one rough point, and never below it. Otherwise, parts of the cam observed
-    only there would be undetermined. A dent is included if the recordings agree on it.
+    A contact is used from the time at which its unobserved impacts have died out.
+    Before that time, the follower bounces close to the cam and is never below it. These
+    earlier samples together count as one rough point of the profile; without them,
+    parts of the cam that are observed only there would be undetermined. A dent is
+    included if the recordings agree on it.
 
     Args:
         surface: The surface so far.

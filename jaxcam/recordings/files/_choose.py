@@ -19,8 +19,8 @@ from ._units import si
 
 
 Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]
-"""Names of the columns in order, with `"-"` to skip one; or channels by their column
-name in the file, with an optional factor: `{"Y1": ("height_mm", -0.8)}`.
+"""Names of the columns in order, with `"-"` to skip one; or a mapping from column names
+in the file to channels, each with an optional factor: `{"Y1": ("height_mm", -0.8)}`.
 """
 TIME = "time_s"
 

@@ -49,11 +49,11 @@ def read_recordings(
             cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
             at long gaps and corrects slips of an encoder (see `mend`). The repairs are
             listed in `meta["notes"]`.
-        columns: Names of the columns in order, with `"-"` to skip one, for a file
-            without a header line; or a channel for each column that has another name,
-            optionally with a factor: `{"Angle": "angle_deg", "Y1": ("height_m",
-            -8e-4)}`. In the second case, only named or required columns are read, and
-            rows with an empty cell in these are omitted.
+        columns: For a file without a header line, the names of the columns in order,
+            with `"-"` to skip one. For columns that have other names in the file, a
+            mapping from those names to channels, optionally with a factor: `{"Angle":
+            "angle_deg", "Y1": ("height_m", -8e-4)}`; then only named or required
+            columns are read, and rows with an empty cell in them are omitted.
         rate: Sampling rate of a file without a time column (Hz).
 
     Returns:
@@ -149,11 +149,11 @@ def read_case(
         split: Column that numbers the recordings in a file with several of them.
         gaps: Handling of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
-        columns: Names of the columns in order, with `"-"` to skip one, for files
-            without a header line; or a channel for each column that has another name,
-            optionally with a factor: `{"Angle": "angle_deg", "Y1": ("height_m",
-            -8e-4)}`. In the second case, rows with an empty cell in these columns are
-            omitted.
+        columns: For files without a header line, the names of the columns in order,
+            with `"-"` to skip one. For columns that have other names in the files, a
+            mapping from those names to channels, optionally with a factor: `{"Angle":
+            "angle_deg", "Y1": ("height_m", -8e-4)}`; then rows with an empty cell in
+            these columns are omitted.
         rate: Sampling rate of files without a time column (Hz).
 
     Returns:

@@ -41,7 +41,8 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     """Return the smallest period of each motion, in points; 0 if there is none.
 
     A motion that spirals in towards an orbit temporarily appears to have a multiple of
-    its period. It counts as non-periodic until its points stop approaching the orbit.
+    the period of the orbit. Such a motion counts as non-periodic until its points stop
+    approaching the orbit.
 
     Args:
         states: Samples, shape `(motions, keep, n)`; periods up to `keep / 2` are

@@ -44,7 +44,7 @@ class Progress(NamedTuple):
 class AbstractJob(abc.ABC):
     """A sweep divided into blocks.
 
-    A block depends only on the fields of the job; if `chained` is set, also on the
+    A block depends only on the fields of the job and, if `chained` is set, on the
     previous block.
     """
 
@@ -83,7 +83,7 @@ def run_blocks(
     Args:
         job: The sweep.
         out: Folder for a Zarr group; by default, results are kept in memory.
-        resume: Whether to continue with the content of the folder. Missing or damaged
+        resume: Whether to continue from the blocks in the folder. Missing or damaged
             blocks are recomputed.
         executor: Any `concurrent.futures.Executor`; default: `workers` threads. Results
             do not depend on it.
@@ -94,7 +94,7 @@ def run_blocks(
         The store with the results.
 
     Raises:
-        ValueError: The folder contains something else.
+        ValueError: The folder contains data other than this sweep.
         RuntimeError: Workers were lost.
     """
     layout = job.layout

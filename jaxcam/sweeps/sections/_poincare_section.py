@@ -20,8 +20,8 @@ class PoincareSection(AbstractSystemSection):
     """Poincaré section: crossings of `function(t, state) = 0`, with their times.
 
     A jump of the state across the section, by an impact, is not a crossing, nor is the
-    end of a contact that held the motion on it. For points at a constraint, use
-    [`jaxcam.sweeps.ImpactSection`][].
+    end of a contact that held the motion on the section. For points at a constraint,
+    use [`jaxcam.sweeps.ImpactSection`][].
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator
