@@ -8,6 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxcam.hybrid.programs import program
+
 from ._point import set_parameters, with_field
 from ._program import correct_, Corrected
 from .predictors import Station
@@ -105,7 +107,7 @@ def follow_lanes(
     return lanes
 
 
-@eqx.filter_jit
+@program
 def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
     """Return the first point of each branch."""
     width = high - low
@@ -134,7 +136,7 @@ def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
     return jax.vmap(begin, in_axes=(axes.tree, 0, 0))(given, z, signs)
 
 
-@eqx.filter_jit
+@program
 def _advance(
     problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds,
 ):  # fmt: skip

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike
 
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import VectorLike
 
 from ._parameter import as_arguments
@@ -17,7 +17,7 @@ from ._settings import BranchSettings
 from .problem import AbstractProblem
 
 
-@eqx.filter_jit
+@program
 def _deflated(problem, guesses, known, count, scale, tolerance, iterations: int):
     """Apply Newton's method to G(u) prod_i (1/|u - u_i|^2 + 1), from all guesses at
     once.

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
+from jaxcam.hybrid.programs import program
+
 from ._limit_cycle import cycle_at_hopf
 from .problem import AbstractProblem, StabilityKind, Start
 from .representation import AbstractRepresentation
@@ -152,12 +154,12 @@ class PeriodicPoints(AbstractRepresentation):
         return float(np.linalg.norm(np.asarray(moved) / np.asarray(scale)))
 
 
-@eqx.filter_jit
+@program
 def _mapped(problem: FixedPoint, u, tangent):
     """Return the next point of an orbit and of a perturbation of it."""
     return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
 
 
-@eqx.filter_jit
+@program
 def _moved(problem: FixedPoint, u, parameters):
     return problem.residual(u, parameters), problem.scale(u, parameters)

@@ -10,6 +10,8 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
+from jaxcam.hybrid.programs import program
+
 from ._context import Context
 from ._padding import Padded
 from ._parameter import with_leaf
@@ -145,7 +147,7 @@ def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
     )
 
 
-_correct = eqx.filter_jit(correct_)
+_correct = program(correct_)
 
 
 def _plain(at: Corrected) -> Corrected:
@@ -216,7 +218,7 @@ def evaluate(problem, context: Context, z, old) -> Any:
     return correct(problem, context, z, old, old, given=True)
 
 
-@eqx.filter_jit
+@program
 def _solve(problem, u, tolerance, max_iterations: int):
     scale = problem.scale(u, problem.parameters)
 

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import Where
 from variational.orbits import implicit_root
 
@@ -57,7 +58,7 @@ def special_point(
     return found[:-1], found[-1]
 
 
-@eqx.filter_jit
+@program
 def _derivatives(problem, u, moving, fixed):
     """Return the derivative of the solution with respect to each moving leaf, (n+1,
     leaf...).

@@ -1,10 +1,10 @@
 """Switch to other branches at a special point."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import Where
 
 from ._branch import branch
@@ -94,7 +94,7 @@ def switch(
     )
 
 
-@eqx.filter_jit
+@program
 def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
     """Return left . B(basis_i, basis_j) of G(u, parameter)."""
 

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import as_arrays
 
 from ._turn_frames import orthonormal
@@ -115,7 +116,7 @@ def covariant_vectors(
     )
 
 
-@eqx.filter_jit
+@program
 def _vectors(system, state, t0, settings, turns: int, transient: int):
     n = state.shape[0]
     # each period begins at the same phase, so time need not grow

@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from jaxcam.hybrid import HybridSystem, simulate
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import (
     normal_acceleration,
     normal_directions,
@@ -223,7 +224,7 @@ def _lowest(system, orbit: Orbit, constraint):
     return jnp.asarray(times[best]), jnp.asarray(states[best])
 
 
-@eqx.filter_jit
+@program
 def _minima(system, starts, ends, constraint, steps: int):
     def one(start, end):
         times, heights = lowest_times(system, start, end, steps)
@@ -234,7 +235,7 @@ def _minima(system, starts, ends, constraint, steps: int):
     return jax.vmap(one)(jnp.asarray(starts), jnp.asarray(ends))
 
 
-@eqx.filter_jit
+@program
 def _local(system, values, where, t, x, constraint):
     build = builder(system, where)
     system = build(values)

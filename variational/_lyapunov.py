@@ -17,6 +17,7 @@ from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.backend import Lacking, say_lacking
 from jaxcam.hybrid.batch import Horizon, Lanes
 from jaxcam.hybrid.checks import check_system, refuse_tracers
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
@@ -305,7 +306,7 @@ def _lanes(system, state, where, values):
 _BLOCK = 128
 
 
-@eqx.filter_jit
+@program
 def _turn(batched, shared, length):
     """Return the length of a period in each motion, shape `(motions,)`, or `(1,)` if
     equal.
@@ -320,7 +321,7 @@ def _turn(batched, shared, length):
     return eqx.filter_vmap(one, in_axes=eqx.if_array(0))(batched)
 
 
-@eqx.filter_jit
+@program
 def _restitutions(batched, shared, t0, states):
     """Return the coefficients of restitution, (motions, m)."""
 

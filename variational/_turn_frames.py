@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow
+from jaxcam.hybrid.programs import program
 
 
 # growth over a period, relative to that of other vectors, that rounding hides
@@ -38,7 +39,7 @@ def first_turn(states: Float[Array, "lanes n"]) -> TurnFrame:
     return TurnFrame(states, frames, jnp.zeros((lanes, n)), none, none, code)
 
 
-@eqx.filter_jit
+@program
 def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnFrame):
     """Run the next `TURNS` periods; return the carried state, and its values at the end
     of each period, `(motions, TURNS, ...)`.

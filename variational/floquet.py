@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import normal_acceleration, normal_velocity
 from jaxcam.parameters import as_arrays
 
@@ -76,7 +77,7 @@ def floquet_multipliers(
     return eigenvalues(made.state, made.determinant)
 
 
-@eqx.filter_jit
+@program
 def _multipliers(system, state, pieces, sticks):
     made = by_product(system, jnp.zeros(0), None, state, pieces, sticks)
     return eigenvalues(made.state, made.determinant)
@@ -172,7 +173,7 @@ def impact_scale(system: HybridSystem, orbit: Orbit) -> Float[Array, ""]:
     )
 
 
-@eqx.filter_jit
+@program
 def _scale(system, times, states, sides, period):
 
     def one(t, x, side):

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 from variational.chatter import next_impact, orbit_from, prepared_frame
 from variational.orbits import steps_for
 
@@ -67,7 +68,7 @@ def _is_none(leaf):
     return leaf is None
 
 
-@eqx.filter_jit
+@program
 def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
     """Return the impacts of the motion that starts at release, for each parameter
     value.

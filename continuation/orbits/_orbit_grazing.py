@@ -2,11 +2,11 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxcam.hybrid.programs import program
 from variational.orbits import lowest_times
 
 from .._context import Context
@@ -24,7 +24,7 @@ from ._watched import Watched, watched_of
 _NUDGE = 1e-6
 
 
-@eqx.filter_jit
+@program
 def _lowest(problem, u, parameters):
     starts, ends = problem.equations.flights(u, parameters)
     steps, whole = problem.equations.steps, not problem.equations.rows

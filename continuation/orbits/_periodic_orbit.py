@@ -2,7 +2,6 @@
 
 import warnings
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +16,7 @@ from jaxcam.hybrid import (
     SwitchedSystem,
 )
 from jaxcam.hybrid.checks import check_start
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.hybrid.surface import gaps
 from jaxcam.parameters import as_arrays, real_array, VectorLike
@@ -294,7 +294,7 @@ def _by_flow(system, guess, length, number, t0, settings):
     return _confirmed(system, state, float(t0), float(found), settings)
 
 
-@eqx.filter_jit
+@program
 def _root(system, guess, t0, length, settings, free: bool):
     """Solve for the state, and for the period if it is `free`: the state then stays in
     the plane through the guess that is perpendicular to the motion.

@@ -1,9 +1,9 @@
 """The release from contact, at which an orbit that sticks is defined."""
 
-import equinox as eqx
 import numpy as np
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 from variational import chatter_frame
 
 
@@ -24,6 +24,6 @@ def release_of(system: HybridSystem) -> np.ndarray:
     return np.append(phase, np.asarray(frame.state))
 
 
-@eqx.filter_jit
+@program
 def _frame(system):
     return chatter_frame(system)

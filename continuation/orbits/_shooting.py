@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 from variational import orbits
 from variational.orbits import inadmissible, Shooting
 
@@ -203,4 +204,4 @@ class ImpactingOrbits(AbstractOrbits):
         return ImpactingOrbits(self.parameters, hits, periods, self.dimension, steps)
 
 
-_antiperiodic = eqx.filter_jit(orbits.antiperiodic)
+_antiperiodic = program(orbits.antiperiodic)

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from jaxcam.hybrid.programs import program
 from variational.orbits import (
     links_of,
     multipliers_at_grazing,
@@ -62,6 +62,6 @@ def multipliers_of(
     return found, ONE
 
 
-@eqx.filter_jit
+@program
 def _parts(equations, u, parameters, number):
     return product_of_links(equations, links_of(equations, u, parameters), number)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
 from variational import Orbit
 
@@ -267,7 +268,7 @@ def _of_jax(leaf):
     return jnp.asarray(leaf) if isinstance(leaf, np.ndarray) else leaf
 
 
-@eqx.filter_jit
+@program
 def _direction(problem: SingleShooting, u, parameters) -> Float[Array, " n"]:
     """Return the direction of the motion, relative to the sizes of the components."""
     x, sizes = u[:-1], problem._sizes(u, parameters)

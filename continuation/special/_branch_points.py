@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import AnyArray
 
 from .._context import Context
@@ -140,6 +141,6 @@ def _at(problem, context: Context, z):
     return evaluate(problem, context, z, np.ones_like(z))
 
 
-@eqx.filter_jit
+@program
 def _residual(problem, leaf: int, z):
     return residual_at(problem, leaf, z)

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+
+from jaxcam.hybrid.programs import program
 
 from .._context import Context
 from .._padding import as_compiled
@@ -22,7 +23,7 @@ from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 _REACH = 2.0**-7
 
 
-@eqx.filter_jit
+@program
 def _b(problem, parameters, u, a, b, of_residual: bool):
     if of_residual:
         return second(lambda u: problem.residual(u, parameters), u, a, b)
@@ -30,13 +31,13 @@ def _b(problem, parameters, u, a, b, of_residual: bool):
     return second(local.motion, local.at, a, b)
 
 
-@eqx.filter_jit
+@program
 def _c(problem, parameters, u, a, b, c):
     local = problem.local_dynamics(u, parameters)
     return third(local.motion, local.at, a, b, c)
 
 
-@eqx.filter_jit
+@program
 def _jacobians(problem, parameters, u, moves):
     """Return the Jacobian of the local map at displacements from a solution."""
     local = problem.local_dynamics(u, parameters)

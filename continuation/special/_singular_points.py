@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import AnyArray
 
 from .._parameter import with_leaf
@@ -43,7 +44,7 @@ def singular_matrix(problem, kind: str, u, parameters):
     return product - jnp.eye(product.shape[0], dtype=a.dtype)
 
 
-@eqx.filter_jit
+@program
 def _singular_matrix(problem, kind: str, leaf: int, z):
     parameters = with_leaf(problem.parameters, leaf, z[-1])
     return singular_matrix(problem, kind, z[:-1], parameters)

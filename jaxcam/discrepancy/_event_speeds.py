@@ -19,6 +19,7 @@ from variational.orbits import (
     SpecialPoint,
 )
 
+from ..hybrid.programs import program
 from ..models import float_speed
 from .policy import Policy
 from .terms import WithTerms
@@ -147,12 +148,12 @@ def _interruption(system, lifted: float, policy: Policy) -> float:
         return float("nan")
 
 
-@eqx.filter_jit
+@program
 def _lifted(system, t, state) -> SpecialPoint:
     return detachment(system, _speed, t, state)
 
 
-@eqx.filter_jit
+@program
 def _monodromy(system, orbit: ImpactOrbit) -> Float[Array, "2 2"]:
     return orbit_monodromy(system, orbit)
 
@@ -162,7 +163,7 @@ def _on_line(system, orbit: ImpactOrbit, offset: float, slope: float) -> Special
     return _compiled(system, orbit, jnp.asarray(offset), jnp.asarray(slope))
 
 
-@eqx.filter_jit
+@program
 def _compiled(system, orbit, offset, slope) -> SpecialPoint:
     def test(matrix):
         return jnp.trace(matrix) - offset - slope * jnp.linalg.det(matrix)

@@ -4,12 +4,12 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..hybrid.programs import program
 from ..recordings import Recording, Segments
 from ._free_run import free_run, FreeRun, Prepared, prepared, restarted, simulated
 from .engine import (
@@ -157,7 +157,7 @@ def _sound(numbers):
     return np.nan_to_num(numbers, nan=1e12, posinf=1e12, neginf=-1e12)
 
 
-@eqx.filter_jit
+@program
 def _off(layout: Layout, one: Prepared, values):
     model = layout.at(values)
     found = simulated(model, restarted(model, one)).channels
@@ -168,7 +168,7 @@ def _off(layout: Layout, one: Prepared, values):
     return jnp.ravel(jnp.where(counts[:, None], missed, 0.0))
 
 
-@eqx.filter_jit
+@program
 def _along(layout: Layout, one: Prepared, values, scale):
     def moved(unit):
         return jax.jvp(lambda x: _off(layout, one, x), (values,), (unit * scale,))[1]

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..hybrid import SwitchedSystem
+from ..hybrid.programs import program
 from ..hybrid.surface import gaps
 from ..recordings import Recording, RecordingError, Segments
 from .engine import (
@@ -207,7 +208,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
     return one
 
 
-@eqx.filter_jit
+@program
 def simulated(model: Model, one: Prepared) -> Simulated:
     """Simulate the motion from the initial state, at each sample."""
     step = one.interval / one.steps
@@ -282,7 +283,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
     return dataclasses.replace(one, state=jnp.asarray(state))
 
 
-@eqx.filter_jit
+@program
 def _off(model: Model, one: Prepared, state):
     """Return residuals in units of the noise, and their derivatives with respect to the
     initial state.

@@ -11,6 +11,7 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from ..hybrid import HybridSystem
+from ..hybrid.programs import program
 from ..models import ConstantRestitution, LinearInSpeed, PowerLawRestitution
 from ..recordings import RecordingError, Segments
 from .engine import Model, Turning
@@ -222,7 +223,7 @@ def _huber(off):
     )
 
 
-@eqx.filter_jit
+@program
 def _solve(law, names, start, data):
     def loss(values, data):
         return _huber(_misfit(values, data, law, names))
@@ -232,7 +233,7 @@ def _solve(law, names, start, data):
     return found.value, found.result
 
 
-@eqx.filter_jit
+@program
 def _normal(law, names, values, data):
     def loss(values):
         off = _huber(_misfit(values, data, law, names))
@@ -291,7 +292,7 @@ def first_bounce(
     return np.array(found)
 
 
-@eqx.filter_jit
+@program
 def _speed_for_height(system, angle, duration, height) -> Array:
     """Find the separation speed of a flight of this `height` by bisection."""
     # the gap is an angle minus that of the cam; on the cam, both are equal

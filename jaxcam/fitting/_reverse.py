@@ -10,6 +10,7 @@ import numpy as np
 import scipy.optimize
 from jax.flatten_util import ravel_pytree
 
+from ..hybrid.programs import program
 from ._fit import fit
 from .engine import cost_of, Layout, Model, Point, Problem
 
@@ -39,7 +40,7 @@ def cost_and_gradient(
     )
 
 
-@eqx.filter_jit
+@program
 def _gradient(layout, pieces, extras, point, where, values):
     # from here on, the parameter values are part of the model
     model = layout.at(point.values[0])

@@ -4,12 +4,12 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ..hybrid.programs import program
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
 from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
@@ -179,14 +179,14 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
     return gaps, slopes, np.sum(parts, axis=-1)
 
 
-@eqx.filter_jit
+@program
 def _gap(layout: Layout, values, times, states, *drive):
     return jax.vmap(lambda *at: _gaps_at(layout, values, *at))(
         *(jnp.asarray(x) for x in (times, states, *drive))
     )
 
 
-@eqx.filter_jit
+@program
 def _slopes(layout: Layout, values, times, states, *drive):
     """Return the derivatives of the gaps with respect to the state and the parameters,
     sample by sample.

@@ -1,8 +1,7 @@
 """Prepare a system before a run that is not traced."""
 
-import equinox as eqx
-
 from ._system import HybridSystem
+from .programs import program
 
 
 def prepared(system: HybridSystem) -> HybridSystem:
@@ -12,6 +11,6 @@ def prepared(system: HybridSystem) -> HybridSystem:
     return _by_xla(system)
 
 
-@eqx.filter_jit
+@program
 def _by_xla(system):
     return system.prepared()

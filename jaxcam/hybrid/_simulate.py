@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +20,7 @@ from .checks import check_start, is_traced
 from .codes import PAINLEVE, RUNNING
 from .loop import Log, LoopState, run, run_reversible
 from .lowering import whole
+from .programs import program
 from .record import (
     assemble,
     Contacts,
@@ -195,7 +195,7 @@ def _constraints(system, t0) -> int:
     return gap.shape[0] if gap.shape else 1
 
 
-@eqx.filter_jit
+@program
 def _release_point(system, t0):
     """Return the state (NaN without a release), the time, and whether there is no
     release.

@@ -16,6 +16,7 @@ from .batch import Chunking, Horizon, Lanes, run_refilled, split_lanes, TurnSamp
 from .checks import check_start, refuse_tracers
 from .codes import message
 from .loop import starts_behind
+from .programs import program
 from .record import Printed, vector_text
 from .surface import check_restitution, restitutions
 
@@ -236,7 +237,7 @@ def _check(batched, shared, settings, t0, period, states) -> None:
         )
 
 
-@eqx.filter_jit
+@program
 def _starts(batched, shared, period, t0, states):
     """Return, per trajectory, the smallest gap, whether it penetrates, the period and
     the coefficients of restitution.

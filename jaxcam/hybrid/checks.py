@@ -23,11 +23,6 @@ def is_traced(tree) -> bool:
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
-def is_tracing() -> bool:
-    """Return whether a computation is being traced into a program, as inside `jit`."""
-    return isinstance(jnp.asarray(0.0), Tracer)
-
-
 def refuse_tracers(name: str, instead: str, *arguments) -> None:
     """Raise `ValueError` for a function that JAX cannot transform.
 

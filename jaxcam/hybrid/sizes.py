@@ -1,11 +1,11 @@
 """Measure the size of each component of a motion, for dimensionless comparisons."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from ..parameters import as_arrays
 from ._system import HybridSystem
+from .programs import program
 
 
 def component_sizes(
@@ -39,7 +39,7 @@ def component_sizes(
     return _sizes(as_arrays(system), *numbers)
 
 
-@eqx.filter_jit
+@program
 def _sizes(system, t, state, period):
     rates = system.vector_field(t, state)
     return jnp.abs(state) + period / (2 * jnp.pi) * jnp.abs(rates)

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from ..hybrid.programs import program
 from ..parameters import real_array
 
 
@@ -63,7 +63,7 @@ def map_attractor(
     return Attractor(int(period), float(rate), bool(bounded))
 
 
-@eqx.filter_jit
+@program
 def _settle(system, start, transient, count, longest):
     x = jax.lax.fori_loop(0, transient, lambda _, x: system(x), start)
 

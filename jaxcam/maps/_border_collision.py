@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..hybrid.programs import program
 from ._piecewise import PiecewiseMap
 
 
@@ -118,7 +119,7 @@ def border_collision(
     return found._replace(parameter=float(parameter), state=float(x))
 
 
-@eqx.filter_jit
+@program
 def _residual(system, where, unknown):
     def both(values):
         moved = eqx.tree_at(where, system, values[1])

@@ -8,6 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ..hybrid.programs import program
+
 
 _NEWTON = 30
 _EXACT = 1e-13
@@ -91,7 +93,7 @@ def _newton(system, where, critical, value, period):
     return value, abs(step)
 
 
-@eqx.filter_jit
+@program
 def _miss(system, where, critical, value, period):
     def distance(parameter):
         moved = eqx.tree_at(where, system, parameter)

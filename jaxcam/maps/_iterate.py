@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from ..hybrid.programs import program
 from ..parameters import real_array, VectorLike
 
 
@@ -62,7 +63,7 @@ def map_diagram(
     return _diagram(system, where, values, start, transient, keep)
 
 
-@eqx.filter_jit
+@program
 def _orbit(system, start, count):
     def one(x, _):
         x = system(x)
@@ -71,7 +72,7 @@ def _orbit(system, start, count):
     return jax.lax.scan(one, start, length=count)[1]
 
 
-@eqx.filter_jit
+@program
 def _diagram(system, where, values, start, transient, keep):
     def one(value):
         moved = eqx.tree_at(where, system, value)

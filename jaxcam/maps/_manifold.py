@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..hybrid.programs import program
 from ..parameters import real_array, VectorLike
 
 
@@ -175,7 +175,7 @@ def _refined(system, point, unit, start, ratio, fractions, order, spacing):
     return fractions, found
 
 
-@eqx.filter_jit
+@program
 def _images(system, points, order):
     def one(x):
         return jax.lax.fori_loop(0, order, lambda _, y: system(y), x)
@@ -183,6 +183,6 @@ def _images(system, points, order):
     return jax.vmap(one)(points)
 
 
-@eqx.filter_jit
+@program
 def _linearised(system, point):
     return system(point), jax.jacfwd(system)(point)

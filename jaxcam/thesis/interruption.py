@@ -1,12 +1,12 @@
 """Find the interruption of complete chatter of the rig."""
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from variational import chatter_accumulation, chatter_frame
 from variational.chatter import fly, interruption_in, release_impacts, surface_state
 
+from ..hybrid.programs import program
 from ..models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from .progress import counted
 from .remember import remembered
@@ -50,7 +50,7 @@ def interruption(system: CamFollower) -> CamFollower:
     )
 
 
-@eqx.filter_jit
+@program
 def _search(system, low, high):
     return interruption_in(system, speed_of, low, high)
 
@@ -76,12 +76,12 @@ def reference(system: CamFollower) -> CamFollower:
     return at_speed(system, speed_of(interruption(system)) - below)
 
 
-impacts_from_release = eqx.filter_jit(release_impacts)
-accumulation_of = eqx.filter_jit(chatter_accumulation)
-contact_at = eqx.filter_jit(surface_state)
+impacts_from_release = program(release_impacts)
+accumulation_of = program(chatter_accumulation)
+contact_at = program(surface_state)
 
 
-@eqx.filter_jit
+@program
 def sticking_state(system: CamFollower):
     """Return the state, gap and relative velocity of a sticking orbit at the end of its
     period.

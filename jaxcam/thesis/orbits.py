@@ -12,6 +12,7 @@ from variational.orbits import (
     SpecialPoint,
 )
 
+from ..hybrid.programs import program
 from ..models import CamFollower, rpm_to_rad_s
 from .progress import counted
 from .speeds import at_rpm, speed_of
@@ -89,17 +90,17 @@ def along_traces(
     return point
 
 
-@eqx.filter_jit
+@program
 def next_orbit(system, guess):
     return impact_orbit(system, guess)
 
 
-@eqx.filter_jit
+@program
 def compiled_monodromy(system, orbit):
     return orbit_monodromy(system, orbit)
 
 
-@eqx.filter_jit
+@program
 def _point(system, orbit, offset, slope):
     def test(matrix):
         return jnp.trace(matrix) - offset - slope * jnp.linalg.det(matrix)

@@ -2,13 +2,13 @@
 sticks.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from ..hybrid import simulate, Trajectory
+from ..hybrid.programs import program
 from ..hybrid.surface import release_point
 from ..models import CamFollower, rpm_to_rad_s
 from .motion_drawing import draw_gap
@@ -32,7 +32,7 @@ def released_turn(system: CamFollower, rpm: float) -> Trajectory:
     return simulate(rig, release.state, start, start + 1.1 * float(rig.period))
 
 
-@eqx.filter_jit
+@program
 def _release(system, time):
     return release_point(system, jnp.asarray(time))
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +10,7 @@ from jaxtyping import Array, Float
 
 from ..hybrid import HybridSystem, Settings
 from ..hybrid.checks import check_system
+from ..hybrid.programs import program
 from ..hybrid.surface import gaps, impacts, normal_directions, normal_velocity
 from ..parameters import as_arrays, real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
@@ -116,7 +116,7 @@ def moreau(
     )
 
 
-@eqx.filter_jit
+@program
 def _run(system, state, first, t0, h):
     system = system.prepared()
     field = system.vector_field
@@ -155,4 +155,4 @@ def _run(system, state, first, t0, h):
     return jax.lax.scan(step, state, first + jnp.arange(CHUNK, dtype=jnp.float64))
 
 
-_gaps = eqx.filter_jit(gaps)
+_gaps = program(gaps)

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..hybrid.programs import program
 from ..parameters import real_array, VectorLike
 from ._chunks import CHUNK, in_chunks
 from .complementarity import explain
@@ -99,7 +99,7 @@ def _one_step(system, h):
     return inverse, forced, system.C @ forced + system.D
 
 
-@eqx.filter_jit
+@program
 def _run(system, state, h):
     inverse, forced, matrix = _one_step(system, h)
 

@@ -2,10 +2,11 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float, Int
+
+from ..hybrid.programs import program
 
 
 # entries of the tableau below this fraction of the largest one are rounding errors
@@ -117,7 +118,7 @@ def solve_lcp(
     return found.z
 
 
-_lemke = eqx.filter_jit(lemke)
+_lemke = program(lemke)
 
 
 def explain(code: int, where: str = "") -> None:

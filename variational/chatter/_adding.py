@@ -1,11 +1,11 @@
 """Find the parameter values at which the interrupted sequence loses an impact."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import Where
 
 from ._chatter_orbit import prepared_orbit
@@ -50,12 +50,12 @@ def adding_thresholds(
     return _thresholds(along, near, far, fewest + jnp.arange(1, count + 1))
 
 
-@eqx.filter_jit
+@program
 def _impacts(along: Line, value):
     return prepared_orbit(along.at(value).prepared(), 0.0).impacts
 
 
-@eqx.filter_jit
+@program
 def _thresholds(along: Line, near, far, numbers):
     """Bisect on the number of impacts, an integer that falls with distance."""
 

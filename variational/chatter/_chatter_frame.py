@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import (
     contact_acceleration,
     normal_acceleration,
@@ -115,7 +116,7 @@ def chatter_frame(system: HybridSystem, time=0.0) -> ChatterFrame:
     return _frame(as_arrays(system), jnp.asarray(time, jnp.float64))
 
 
-@eqx.filter_jit
+@program
 def _frame(system, time) -> ChatterFrame:
     return prepared_frame(system.prepared(), time)
 

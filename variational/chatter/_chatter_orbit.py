@@ -9,6 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxcam import HybridSystem
 from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import (
     chatter_completion,
     normal_acceleration,
@@ -116,7 +117,7 @@ def chatter_accumulation(
     return _orbit(as_arrays(system), jnp.asarray(time, jnp.float64), periods)
 
 
-@eqx.filter_jit
+@program
 def _orbit(system, time, periods) -> ChatterOrbit:
     return prepared_orbit(system.prepared(), time, periods)
 

@@ -21,6 +21,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import normal_directions
 from jaxcam.parameters import as_arrays, pick, Where
 
@@ -198,7 +199,7 @@ def composed_map(
     return _compose(line(system, where), value, jnp.asarray(rank), phase)
 
 
-@eqx.filter_jit
+@program
 def _compose(along, value, rank, phase) -> ComposedMap:
     def turn(value):
         moved = along.at(value).prepared()
@@ -311,7 +312,7 @@ def simulated_by_parameter(
     return _moved(line(system, where), value + jnp.asarray(changes), phase)
 
 
-@eqx.filter_jit
+@program
 def _moved(along, values, phase):
     def one(value):
         system = along.at(value).prepared()
@@ -325,7 +326,7 @@ def _moved(along, values, phase):
     return jax.vmap(one)(values)
 
 
-@eqx.filter_jit
+@program
 def _simulated(system, frame, time, speeds, section):
     def one(speed):
         state = surface_state(system, time, speed)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import as_arrays
 
 from ._scalar import check_chatter_system
@@ -186,7 +187,7 @@ def _corners(turn, accumulation, farthest, most: int) -> np.ndarray:
     return corners
 
 
-@eqx.filter_jit
+@program
 def _turns(system, state, along, values, phase, component):
     def image(x):
         moved = state + (x - state[component]) * along

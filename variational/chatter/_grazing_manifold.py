@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import contact_acceleration
 from jaxcam.parameters import as_arrays
 
@@ -77,7 +78,7 @@ def grazing_manifold(
     return _manifold(as_arrays(system).prepared(), n, points, horizon)
 
 
-@eqx.filter_jit
+@program
 def _manifold(system, n, points, horizon) -> GrazingManifold:
     grid = system.period * jnp.linspace(0.0, 1.0, 4 * points, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
@@ -149,7 +150,7 @@ def chattering_region(
     return _boundary(as_arrays(system).prepared(), points, impacts, near)
 
 
-@eqx.filter_jit
+@program
 def _boundary(system, points, impacts, near) -> ImpactCurve:
     frame = prepared_frame(system, 0.0)
     law = scaling_law(frame.restitution)

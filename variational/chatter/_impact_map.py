@@ -10,6 +10,7 @@ from jaxtyping import Array, ArrayLike, Bool, Float
 
 from jaxcam import HybridSystem
 from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import contact_state, normal_directions, normal_velocity
 from jaxcam.parameters import as_arrays
 
@@ -150,7 +151,7 @@ def impact_map(system: HybridSystem, time, speed, *, horizon=None):
     return _impact_map(system, time, speed, jnp.asarray(horizon, jnp.float64))
 
 
-@eqx.filter_jit
+@program
 def _impact_map(system, time, speed, horizon):
     system = system.prepared()
     state = surface_state(system, time, speed)

@@ -15,6 +15,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.parameters import as_arrays, pick, unit_tangent, Where
 
 from ._chatter_orbit import prepared_orbit
@@ -131,13 +132,13 @@ def _no_tangent(leaf):
     return jnp.zeros_like(leaf) if eqx.is_inexact_array(leaf) else None
 
 
-@eqx.filter_jit
+@program
 def _rate(along: Line, moved: Line, value, periods: int):
     """Return the change of the margin at a fixed value of the parameter."""
     return eqx.filter_jvp(lambda a: _margin(a, value, periods), (along,), (moved,))[1]
 
 
-@eqx.filter_jit
+@program
 def _search(along: Line, low, high, periods: int) -> Interruption:
     """Apply Newton's method with bisection if it leaves the bracket or does not
     converge.

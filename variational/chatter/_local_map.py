@@ -6,6 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxcam.hybrid.programs import program
+
 from ._find_lobes import Lobes
 
 
@@ -154,7 +156,7 @@ def iterate_local_map(
     return _iterate(local, jnp.asarray(shifts, jnp.float64), turns, keep)
 
 
-@eqx.filter_jit
+@program
 def _iterate(local, shifts, turns, keep):
     def one(shift):
         def step(x, _):

@@ -9,6 +9,7 @@ from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from jaxcam import HybridSystem
 from jaxcam.hybrid.lowering import while_loop
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import normal_velocity
 from jaxcam.parameters import as_arrays
 
@@ -141,7 +142,7 @@ def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
     return _turn(as_arrays(system), jnp.asarray(state, jnp.float64), phase)
 
 
-@eqx.filter_jit
+@program
 def _turn(system, state, phase) -> SectionArrival:
     system = system.prepared()
     time = jnp.asarray(phase * system.period, jnp.float64)
@@ -175,7 +176,7 @@ def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
     return _from_release(as_arrays(system), count, jnp.asarray(time, jnp.float64))
 
 
-@eqx.filter_jit
+@program
 def _from_release(system, count, time) -> ImpactPoint:
     system = system.prepared()
     frame = prepared_frame(system, time)

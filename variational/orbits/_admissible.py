@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 
 from ._shooting import Shooting
 
@@ -71,6 +71,6 @@ def refuse(shooting: Shooting, u, system: HybridSystem) -> str | None:
     )
 
 
-@eqx.filter_jit
+@program
 def _look(shooting, u, system):
     return shooting.seen(u, system), shooting.period(u, system)

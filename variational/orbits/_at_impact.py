@@ -2,12 +2,12 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import gaps, impacts, normal_acceleration, normal_velocity
 
 from ._gap_sizes import gap_sizes
@@ -47,7 +47,7 @@ def start_at_impact(system: HybridSystem, t, state, period) -> ImpactStart | Non
     return ImpactStart(side, state if speed[side] > 0 else after[side], window)
 
 
-@eqx.filter_jit
+@program
 def _look(system, t, state, period):
     return (
         gaps(system, t, state),
@@ -58,7 +58,7 @@ def _look(system, t, state, period):
     )
 
 
-@eqx.filter_jit
+@program
 def after_and_speeds(system, time, before, sides):
     """Return the states after impacts, and the normal velocities before and after."""
 

@@ -7,13 +7,13 @@ impacts are as well conditioned as the orbit itself, regardless of their speed.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float, Int
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 
 from .._flight import fly_linearised
 from ._links import landed, matrix_of
@@ -69,7 +69,7 @@ def close(
     return Knots(improved[:number] if better else rows, before, first)
 
 
-@eqx.filter_jit
+@program
 def _newton(system, rows, sides, real, following, period, scale):
     system = system.prepared()
     # the last valid row is followed by the first one, a period later

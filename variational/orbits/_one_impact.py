@@ -1,11 +1,11 @@
 """Find orbits with one impact per period without simulation."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxcam.hybrid import HybridSystem
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import contact_acceleration, contact_state, normal_directions
 
 from ._impact_orbit import clearance, impact_orbit, ImpactOrbit, orbit_trace
@@ -53,7 +53,7 @@ def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
     return found
 
 
-@eqx.filter_jit
+@program
 def _search(system, state):
     period = jnp.asarray(system.period)
     times = period * jnp.arange(_PHASES, dtype=float) / _PHASES

@@ -2,13 +2,13 @@
 
 from typing import TYPE_CHECKING
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from jaxcam.hybrid import HybridSystem, Trajectory
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.record import Impacts
 
 from ._flight import flight_nodes
@@ -48,7 +48,7 @@ def steps_for(system: HybridSystem, starts, ends) -> int:
     return _STEPS[-1]
 
 
-@eqx.filter_jit
+@program
 def _errors(system, starts, ends, steps: int):
     return jax.vmap(lambda a, b: flight_nodes(system, a[0], a[1:], b, steps)[2])(
         starts, ends

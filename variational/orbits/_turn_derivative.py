@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, Settings
+from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import field_in_force
 from jaxcam.parameters import as_arrays, Pick
 
@@ -61,7 +62,7 @@ def builder(system, where: Pick | None) -> Callable:
     return build
 
 
-@eqx.filter_jit
+@program
 def by_product(system, values, where, state, pieces: TurnPieces, sticks):
     n = state.shape[0]
     build = builder(system, where)
@@ -99,7 +100,7 @@ def by_flow(
     )
 
 
-@eqx.filter_jit
+@program
 def _by_flow(system, values, where, state, t0, period, settings):
     build = builder(system, where)
 
@@ -109,7 +110,7 @@ def _by_flow(system, values, where, state, t0, period, settings):
     return jax.jacfwd(end, argnums=(0, 1, 2, 3))(state, t0, period, values)
 
 
-@eqx.filter_jit
+@program
 def flown(system, t0, state, t1) -> Float[Array, " n"]:
     """Return the final state of a flight without events."""
     system = system.prepared()

@@ -25,10 +25,10 @@ from ...fitting.engine import (
     off_nominal,
     Point,
     prior_information,
-    program,
     runge_kutta,
     shows_directly,
 )
+from ...hybrid.programs import program
 from ...parameters import FloatScalar
 from ..terms import Motion, system_with_terms, Term
 from ._blocks import Blocks

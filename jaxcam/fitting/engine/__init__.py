@@ -48,7 +48,6 @@ from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
 from ._predict import runge_kutta as runge_kutta
 from ._problem import Problem as Problem, Weights as Weights
 from ._problem_checks import parameter_places as parameter_places
-from ._program import program as program
 from ._seen_directly import shows_directly as shows_directly
 from ._sharpness import loosened as loosened, separated as separated
 from ._starts import state_size as state_size

@@ -13,8 +13,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ...hybrid.programs import program
 from ._linearise import Blocks
-from ._program import program
 
 
 # Regularisation of the states, as a fraction of their own information

@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from ...hybrid.programs import program
 from ._model import Model
-from ._program import program
 
 
 def _as_it_is(model: Model) -> Model:

@@ -2,12 +2,12 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ...hybrid.programs import program
 from ._each_record import each_record
 from ._layout import Layout
 from ._likelihood import score_all
@@ -23,7 +23,6 @@ from ._linear import (
     tied,
 )
 from ._pieces import Pieces
-from ._program import program
 from ._seen_directly import shows_directly
 
 
@@ -146,7 +145,7 @@ def _predicted(layout, pieces, extras, point):
     return jax.vmap(record)(pieces, extras, *point)
 
 
-@eqx.filter_jit
+@program
 def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Costs:
     """Return costs without derivatives; can be differentiated in reverse mode."""
     seen, resting, off = _predicted(layout, pieces, extras, point)

@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ...hybrid.programs import program
 from ._layout import Layout
 from ._linear import Extras, flight_inputs, flown
 from ._linearise import Point
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
 from ._predict import after_impact
-from ._program import program
 from ._sharpness import states_only
 
 

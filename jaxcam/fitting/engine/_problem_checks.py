@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid import SwitchedSystem
+from ...hybrid.programs import program
 from ._layout import Layout
 from ._linearise import Point
 from ._model import augmented_field, Model
 from ._pieces import Pieces
-from ._program import program
 
 
 def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:

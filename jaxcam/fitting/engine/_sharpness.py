@@ -5,13 +5,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ...hybrid.programs import program
 from ._layout import Layout
 from ._linear import Extras, Sharpness
 from ._linearise import assemble, Point
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
 from ._predict import after_impact, fly, smallest_gap
-from ._program import program
 
 
 # Standard error of a joint within a flight, relative to that of the state from the

@@ -6,13 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ...hybrid.programs import program
 from ._layout import Layout
 from ._linear import Extras
 from ._linearise import Point
 from ._model import DriveState, Input, Model
 from ._pieces import Pieces
 from ._predict import end_of_flight, fly
-from ._program import program
 
 
 # Allowed change (in units of the error of a piece's state) when the substeps are halved

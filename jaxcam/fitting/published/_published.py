@@ -20,6 +20,7 @@ import scipy.optimize
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
+from ...hybrid.programs import program
 from ...parameters import VectorLike
 from ._published_fit import PublishedFit
 
@@ -142,8 +143,8 @@ def fit_published(
         )
         return jnp.concatenate([jnp.atleast_1d(f(moved)) for f in quantities])
 
-    @eqx.filter_jit
-    def program(unknowns, model):
+    @program
+    def linearised(unknowns, model):
         # a single call site, because tracing and compiling the quantities takes most of
         # the time
         def twice(unknowns):
@@ -157,7 +158,7 @@ def fit_published(
         misses = np.append((value - values) / errors, weights * unknowns)
         return float(np.sum(misses**2))
 
-    describe = _described(lambda at: program(at, model), cost, progress)
+    describe = _described(lambda at: linearised(at, model), cost, progress)
     unknowns = np.zeros(nominal.shape[0])
     if start is not None:
         unknowns = (np.asarray(start, dtype=float) - np.asarray(nominal)) / scales

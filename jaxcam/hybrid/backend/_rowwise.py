@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from ..caches import Cache
+from ..programs import program
 from ._layout import laid_out, Layout
 from ._machine import vector_width
 from ._mapped import Mapped
@@ -41,7 +42,7 @@ class Rowwise:
         self._width = vector_width() if width is None else width
         self._cache = Cache()
 
-        self._by_xla = eqx.filter_jit(self._of_rows)
+        self._by_xla = program(self._of_rows)
 
     def __call__(self, shared, rows, count: int, *, compiles: bool):
         """Return the results for `count` rows.

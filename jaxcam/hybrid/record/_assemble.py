@@ -3,7 +3,6 @@
 from types import ModuleType
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from .._switched import SwitchedSystem
 from ..backend import Rowwise
 from ..codes import RowKind
 from ..loop import Log, rows_of_kind
+from ..programs import program
 from ..surface import normal_velocity, surfaces
 from ._events import Contacts, Impacts, Steps, Switches
 
@@ -190,7 +190,7 @@ def _velocity_at(system, point):
 _VELOCITIES = Rowwise(_velocity_at)
 
 
-@eqx.filter_jit
+@program
 def _normal_velocities(system, times, states, which):
     speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
     return jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]

@@ -4,7 +4,6 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +13,7 @@ from .._settings import Settings
 from ..backend import Rowwise
 from ..breakpoints import between
 from ..loop import Functions
+from ..programs import program
 from ..runge_kutta import step, tableau_of
 from ..segments import one_step
 from ..surface import field_in_force
@@ -99,7 +99,7 @@ def _points_of(steps: Steps, times, xp: ModuleType) -> _Point:
     return _Point(times, steps.time[k], end, steps.state[k], steps.contact[k], sides)
 
 
-@eqx.filter_jit
+@program
 def sample(system, settings: Settings, steps: Steps, times):
     """Return the states at some times, `(times, n)`, in a program of XLA."""
     run = _run_of(system.prepared(), settings, steps, jnp)

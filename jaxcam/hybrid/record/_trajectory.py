@@ -1,6 +1,5 @@
 """The result of a simulation: impacts, contacts, and the state at any time."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,8 +8,9 @@ from jaxtyping import Array, Float, Int
 from ...tables import ShortTable
 from .._settings import Settings
 from .._system import HybridSystem
-from ..checks import is_traced, is_tracing, refuse_tracers
+from ..checks import is_traced, refuse_tracers
 from ..codes import message
+from ..programs import is_tracing, program
 from ..surface import gaps
 from ._events import Contacts, Impacts, Steps, Switches
 from ._printed import Printed
@@ -214,7 +214,7 @@ class Trajectory(Printed):
         return crossings(self, function, direction)
 
 
-@eqx.filter_jit
+@program
 def _gaps(system, times, states):
     values = jax.vmap(lambda t, x: gaps(system, t, x))(times, states)
     return values[:, 0] if values.shape[1] == 1 else values

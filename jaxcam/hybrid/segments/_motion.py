@@ -11,6 +11,7 @@ import optimistix as optx
 
 from .._system import HybridSystem
 from ..loop import first_extents, Jet
+from ..programs import program
 from ..surface import (
     completion_time,
     contact_multipliers,
@@ -45,7 +46,7 @@ def _compiled(method):
     """Compile a function only once: numbers become arrays, which are not part of the
     program.
     """
-    compiled = eqx.filter_jit(method)
+    compiled = program(method)
 
     @functools.wraps(method)
     def call(self, *arguments):

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ...hybrid.programs import program
 from .._parameters import is_concrete, parameter, require_finite, require_positive
 from ._fourier_profile import FourierProfile
 from ._profile import CamProfile
@@ -98,7 +99,7 @@ class EccentricCircle(CamProfile):
         self.prepared()
 
 
-@eqx.filter_jit
+@program
 def _series(circle: EccentricCircle):
     """Return the mean, cosines and sines to keep, and the sum of the others (rad)."""
     keep = circle.harmonics

@@ -7,13 +7,13 @@ compiled program that is shared by all recordings of similar size.
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ...hybrid import HybridSystem
+from ...hybrid.programs import program
 from ...hybrid.runge_kutta import array_step, RK4
 from .._errors import RecordingError
 from ..cut import fit_local, padded
@@ -158,7 +158,7 @@ def _predict(system, picks, substeps, state, clock, time):
     return jax.lax.scan(step, (time[0], state), time)[1].T
 
 
-@eqx.filter_jit
+@program
 def _predict_all(system, picks, substeps, state, clock, time) -> Float[Array, "b c k"]:
     def one(state, clock, time):
         return _predict(system, picks, substeps, state, clock, time)
@@ -166,7 +166,7 @@ def _predict_all(system, picks, substeps, state, clock, time) -> Float[Array, "b
     return jax.vmap(one)(state, jnp.asarray(clock), jnp.asarray(time))
 
 
-@eqx.filter_jit
+@program
 def _fit(system, picks, substeps, guess, clock, time, values, mask, noise):
     noise = jnp.asarray(noise)
 
@@ -201,7 +201,7 @@ def _inverse(matrix):
     return jnp.linalg.pinv(matrix / scales, rtol=1e-12, hermitian=True) / scales
 
 
-@eqx.filter_jit
+@program
 def _match(system, picks, clock, values, rates, guess):
     def one(clock, values, rates, guess):
         target = jnp.concatenate([values, rates])

@@ -1,11 +1,11 @@
 """Compute residuals of a model in each mode: in flight, in contact and at impacts."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ...hybrid.programs import program
 from ..cut import Flight, padded, Segments
 from ._comparison import Residuals
 from ._flight_fit import fit_flights, observed, rate_of, size_of, state_at
@@ -170,7 +170,7 @@ def _distance(system, pick, clock, state) -> Float[np.ndarray, " k"]:
     return np.asarray(off)[: len(clock)]
 
 
-@eqx.filter_jit
+@program
 def _off_surface(system, pick, clock, state):
     """Return the gap in units of the channel, to first order, shape `(k,)`."""
 
@@ -187,7 +187,7 @@ def _nearest(system, clock, state):
     return jnp.min(jnp.atleast_1d(system.gap(clock, state)))
 
 
-@eqx.filter_jit
+@program
 def _after_impact(system, pick, clock, state):
     """Return the rate of the channel after the impact, and its derivative with respect
     to the rate before.

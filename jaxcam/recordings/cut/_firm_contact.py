@@ -7,12 +7,12 @@ the follower is on the cam; at impacts, the motion is not smooth. If the spring 
 small, the test is inconclusive.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ...hybrid.programs import program
 from .._recording import Recording
 from .._rig import Rig
 from ._contact_stretches import stretches
@@ -77,7 +77,7 @@ def _free(rig: Rig, speed: float, places) -> Float[np.ndarray, " places"]:
     return np.asarray(_accelerations(rig.system(speed), jnp.asarray(places)))
 
 
-@eqx.filter_jit
+@program
 def _accelerations(system, places):
     def one(place):
         state = jnp.stack([place, jnp.zeros_like(place)])

@@ -7,12 +7,12 @@ tolerances, the phases of small contact force at which this may happen.
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ...hybrid.programs import program
 from ...hybrid.surface import contact_acceleration
 from .._drive import Drive
 from .._rig import Quantity, Rig
@@ -82,7 +82,7 @@ def _pull(rig: Rig, speed: float) -> Float[np.ndarray, " 720"]:
     return np.asarray(_along(system, times))
 
 
-@eqx.filter_jit
+@program
 def _along(system, times):
     def one(t):
         angle = system.contact_angle(system.cam_angle(t))

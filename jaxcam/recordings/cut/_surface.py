@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ...hybrid.programs import program
 from ...models import EccentricCircle
 from .._rig import Rig
 from ._bend import WAVES, waves
@@ -143,7 +144,7 @@ def with_vector(surface: Surface, vector) -> Surface:
     )
 
 
-@eqx.filter_jit
+@program
 def linearise(surface, vector, turned):
     """Return contact angles `(k,)` and their derivatives `(k, p)` with respect to the
     coefficients.
@@ -157,13 +158,13 @@ def linearise(surface, vector, turned):
     return contact_angle(low), jnp.concatenate([jacobian, waves(turned)], axis=-1)
 
 
-@eqx.filter_jit
+@program
 def _evaluate(surface, turned):
     turned = jnp.asarray(turned)
     return jax.jvp(surface, (turned,), (jnp.ones_like(turned),))
 
 
-@eqx.filter_jit
+@program
 def _slope_jacobian(surface, vector, turned):
     turned = jnp.asarray(turned)
 

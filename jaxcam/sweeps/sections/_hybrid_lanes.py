@@ -20,6 +20,7 @@ from ...hybrid.batch import (
 )
 from ...hybrid.checks import check_system
 from ...hybrid.loop import starts_behind
+from ...hybrid.programs import program
 from ...hybrid.sizes import component_sizes
 from ...hybrid.surface import contact_state, gaps, least_gaps
 from ...parameters import as_arrays
@@ -217,7 +218,7 @@ def _rows(states):
     return jnp.asarray(np.asarray(states, dtype=float))
 
 
-@eqx.filter_jit
+@program
 def _gaps(batched, shared, t0, states, room):
     def one(batched, state):
         return jnp.min(least_gaps(eqx.combine(batched, shared), t0, state, room))
@@ -225,7 +226,7 @@ def _gaps(batched, shared, t0, states, room):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
-@eqx.filter_jit
+@program
 def _sizes(batched, shared, times, states, turns):
     def one(batched, t, state, turn):
         return component_sizes(eqx.combine(batched, shared), t, state, turn)
@@ -234,7 +235,7 @@ def _sizes(batched, shared, times, states, turns):
     return eqx.filter_vmap(one, in_axes=axes)(batched, times, states, turns)
 
 
-@eqx.filter_jit
+@program
 def _behind(batched, shared, t0, states):
     def one(batched, state):
         return starts_behind(eqx.combine(batched, shared), t0, state)
@@ -242,7 +243,7 @@ def _behind(batched, shared, t0, states):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
-@eqx.filter_jit
+@program
 def _lifted(batched, shared, t0, states):
     def one(batched, state):
         system = eqx.combine(batched, shared)
@@ -259,7 +260,7 @@ def _lifted(batched, shared, t0, states):
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
 
-@eqx.filter_jit
+@program
 def _contact_states(batched, shared, t0):
     def one(batched):
         system = eqx.combine(batched, shared)
@@ -270,7 +271,7 @@ def _contact_states(batched, shared, t0):
     return eqx.filter_vmap(one, in_axes=eqx.if_array(0))(batched)
 
 
-@eqx.filter_jit
+@program
 def _periods(batched, shared):
     def one(batched):
         return eqx.combine(batched, shared).period * 1.0

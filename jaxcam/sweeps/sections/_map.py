@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid.codes import NOT_FINITE
+from ...hybrid.programs import program
 from ._samples import BEHIND, Samples
 from ._section import AbstractSection
 
@@ -90,7 +91,7 @@ class Map(AbstractSection):
         return self.components[:n] + more
 
 
-@eqx.filter_jit
+@program
 def _iterate(function, parameters, where, values, states, turns, keep):
     def one(value, state):
         own = parameters

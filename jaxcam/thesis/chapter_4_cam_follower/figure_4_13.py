@@ -4,7 +4,6 @@ The thesis gives neither the recording behind the figure nor its initial angle.
 """
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
@@ -12,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
+from ...hybrid.programs import program
 from ...models import CamFollower
 from ..target import Rows, Target
 
@@ -22,7 +22,7 @@ _HANGING = (-1.55, 0.0)
 """Range in which the equilibrium angle is searched for (rad)."""
 
 
-@eqx.filter_jit
+@program
 def _spring(system, angle):
     """Return the spring torque at an angle, and the stiffness there."""
     torque = jax.grad(system.potential_energy)
@@ -39,7 +39,7 @@ def equilibrium(system: CamFollower) -> float:
     return float(brentq(torque, low, high))  # pyright: ignore
 
 
-@eqx.filter_jit
+@program
 def fall_angles(system: CamFollower, times) -> jax.Array:
     """Return the angle (rad) of the free follower, released at 0.75 rad, at `times`
     (s).

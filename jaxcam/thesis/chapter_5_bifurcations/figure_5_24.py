@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from variational import chatter_accumulation, scaling_law
 
+from ...hybrid.programs import program
 from ...models import CamFollower, rad_s_to_rpm, rpm_to_rad_s
 from ...plotting.colours import FLIGHT, IMPACT, RECORDED
 from ..interruption import beside_interruption, interruption
@@ -23,7 +24,7 @@ _BELOW = 152.65
 """Speed (rpm) at which the sticking time is given."""
 
 
-@eqx.filter_jit
+@program
 def _sticking(system, speeds):
     def one(speed):
         rig = eqx.tree_at(speed_of, system, speed)

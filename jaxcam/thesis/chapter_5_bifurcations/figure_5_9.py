@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from ... import sweeps
 from ...hybrid import Settings
+from ...hybrid.programs import program
 from ...hybrid.surface import normal_velocity
 from ...models import CamFollower, rpm_to_rad_s
 from ...plotting.colours import FLIGHT
@@ -60,7 +61,7 @@ def rebound_speeds(system: CamFollower, number: int) -> np.ndarray:
     return np.asarray(_normal(rig.prepared(), jnp.asarray(times), jnp.asarray(states)))
 
 
-@eqx.filter_jit
+@program
 def _normal(rig, times, states):
     return jax.vmap(lambda t, x: normal_velocity(rig, t, x)[0])(times, states)
 

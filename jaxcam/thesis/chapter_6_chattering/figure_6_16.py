@@ -1,6 +1,5 @@
 """Figure 6.16: one cycle of the composed map, without the printed scale factors."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,6 +7,7 @@ from matplotlib.figure import Figure
 
 from variational import section_turn
 
+from ...hybrid.programs import program
 from ...models import CamFollower
 from ..remember import remembered
 from ..target import Rows, Target
@@ -32,7 +32,7 @@ def rebuilt_turn(system: CamFollower) -> Rebuilt:
     return Rebuilt(change, predicted, simulated, composed)
 
 
-@eqx.filter_jit
+@program
 def _turns(rig, states):
     return jax.vmap(lambda state: section_turn(rig, state))(states)
 

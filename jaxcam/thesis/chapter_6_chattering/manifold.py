@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
@@ -19,6 +18,7 @@ from variational import (
 from variational.chatter import ChatterFrame, GrazingManifold, ImpactCurve
 
 from ... import plotting
+from ...hybrid.programs import program
 from ...models import CamFollower
 from ..interruption import interruption
 from ..remember import remembered
@@ -49,7 +49,7 @@ def manifold_of(system: CamFollower, branches: int) -> Manifold:
     )
 
 
-@eqx.filter_jit
+@program
 def _onwards(system, time, speed):
     """Return the rebound speed of the next impact."""
     return jax.vmap(lambda t, u: impact_map(system, t, u)[1])(time, speed)

@@ -1,9 +1,12 @@
-"""Compile the programs of a fit."""
+"""Compile functions with options that shorten compilation."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 import equinox as eqx
+import jax
+from jax.core import Tracer
 
 
 P = ParamSpec("P")
@@ -16,11 +19,16 @@ T = TypeVar("T")
 _OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 
 
+def is_tracing() -> bool:
+    """Return whether a computation is being traced into a program, as inside `jit`."""
+    return isinstance(jax.lax.stop_gradient(0.0), Tracer)
+
+
 def program(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a function when it is first called, as `equinox.filter_jit` does.
 
-    This compiles faster, and the program runs as fast. It cannot be called within
-    another compiled function, because XLA takes its options from the outermost one.
+    This takes about half the time, and the program runs as fast. Within another
+    compiled function, the options of that function apply.
 
     Args:
         function: The function.
@@ -29,4 +37,11 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
         The compiled function.
     """
     jitted: Any = eqx.filter_jit
-    return jitted(function, compiler_options=_OPTIONS)
+    # XLA takes its options from the outermost program, and JAX refuses others
+    inner, outermost = jitted(function), jitted(function, compiler_options=_OPTIONS)
+
+    @functools.wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        return (inner if is_tracing() else outermost)(*args, **kwargs)
+
+    return call
