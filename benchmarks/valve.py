@@ -3,10 +3,11 @@
     python -m benchmarks.valve # the CPU, one core
     python -m benchmarks.valve --gpu --flows 30720
 
-The relief valve with impacts (coefficient of restitution 0.8) at many flows between 0.2
-and 10 is the public benchmark for impacting systems: 1056 returns to the section where
-the lift is greatest, for each flow, at a tolerance of 1e-10. Here, a motion ends at a
-time instead, which is long enough for about as many returns; they are counted.
+The relief valve with impacts (coefficient of restitution 0.8) at many flow rates
+between 0.2 and 10 is the public benchmark for impacting systems: 1056 returns to the
+section where the lift is greatest, for each flow rate, at a tolerance of 1e-10. Here, a
+motion instead ends at a given time, long enough for about as many returns, and the
+returns are counted.
 """
 
 import os
@@ -95,7 +96,8 @@ def main(
     count, steps = counted(values, duration, backend)
     total = int(np.nansum(count))
     print(
-        f"relief valve: {flows} flows, {total / max(1, done.sum()):.0f} returns each, "
+        f"relief valve: {flows} flow rates, "
+        f"{total / max(1, done.sum()):.0f} returns each, "
         f"{np.count_nonzero(~done)} failed; {steps.sum() / total:.0f} attempted steps "
         f"a return; first call {first:.1f} s"
     )

@@ -98,7 +98,7 @@ def curve(
             monitor of its problem.
         where: Selects the two parameters. The first becomes an unknown; step lengths
             and `point.parameter` refer to the second.
-        bounds: (lowest, highest) value of both parameters; the curve ends exactly on
+        bounds: (lowest, highest) value of each parameter; the curve ends exactly on
             these bounds.
         algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.

@@ -34,7 +34,7 @@ class Padded(NamedTuple):
             count: Number of entries of a vector without the additional unknowns.
 
         Returns:
-            Shape `(count,)`.
+            Positions, shape `(count,)`.
         """
         behind = count - self.kept.size
         return np.append(self.kept, self.size + np.arange(behind))

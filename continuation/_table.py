@@ -21,7 +21,7 @@ def table(
         every: Show every ordinary point whose label is a multiple of this; 0 shows
             none.
         components: Number of state components to show.
-        shown: Heading of the parameter column and a factor to convert its unit, such as
+        shown: Heading of the parameter column, and a factor for its values, such as
             `("speed (rpm)", 30 / math.pi)`.
 
     Returns:

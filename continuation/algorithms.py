@@ -96,7 +96,7 @@ class PseudoArclength(AbstractAlgorithm):
 class MoorePenrose(AbstractAlgorithm):
     """Predictor-corrector with least-norm corrections from the Moore-Penrose inverse.
 
-    The corrector's plane turns with the iterate, which to first order is equivalent to
+    The corrector's plane turns with the iterate. To first order, this is equivalent to
     recomputing the tangent in each iteration (thesis, section 3.4.3, method 3).
 
     Examples:

@@ -95,7 +95,7 @@ class AbstractProblem(eqx.Module):
         """Return G(u, parameters), which is zero on the branch.
 
         Returns:
-            Shape `(n,)`.
+            Residuals, shape `(n,)`.
         """
 
     def linearisation(
@@ -103,13 +103,13 @@ class AbstractProblem(eqx.Module):
     ) -> Float[Array, "k k"]:
         """Return the matrix whose eigenvalues determine stability.
 
-        By default, it is dG/du for equilibria and dG/du + I for maps, which is correct
-        for G = f(u) - u. Multiple shooting overrides this with the monodromy matrix,
-        and autonomous orbits with that of the map on a section (without the trivial
-        multiplier).
+        By default, it is dG/du for equilibria and dG/du + I for maps; this is correct
+        for G = f(u) - u. Multiple shooting overrides this with the monodromy matrix;
+        without forcing, the override returns the derivative of the map on a section
+        (without the trivial multiplier).
 
         Returns:
-            Shape `(k, k)`.
+            The matrix, shape `(k, k)`.
         """
         del u, parameters
         if self.stability == "map":
@@ -122,7 +122,7 @@ class AbstractProblem(eqx.Module):
         """Return the derivative of the residual with respect to u and the parameter,
         and `linearisation`.
 
-        Override this method if both share computations.
+        Override this method if the two share computations.
 
         Args:
             p: Value of the parameter.
@@ -130,7 +130,7 @@ class AbstractProblem(eqx.Module):
                 one set to p.
 
         Returns:
-            Shapes `(n, n+1)` and `(k, k)`.
+            The derivative, shape `(n, n+1)`, and the matrix, shape `(k, k)`.
         """
         whole = jax.jacfwd(lambda z: self.residual(z[:-1], parameters_at(z[-1])))(
             jnp.append(u, p)
@@ -164,7 +164,7 @@ class AbstractProblem(eqx.Module):
         By default, the scale is 1, or the root mean square of u if that is larger.
 
         Returns:
-            Shape `(n,)`.
+            Scales, shape `(n,)`.
         """
         del parameters
         size = jnp.maximum(1.0, jnp.sqrt(jnp.mean(u * u)))
@@ -195,7 +195,7 @@ class AbstractProblem(eqx.Module):
         """Return the values of the test functions, and further quantities to store.
 
         Returns:
-            The values, by the names in `monitors`, and the quantities to store in
+            The values, keyed by the names in `monitors`, and the quantities to store in
                 `point.observed`.
         """
         del u, parameters
@@ -204,7 +204,7 @@ class AbstractProblem(eqx.Module):
     def watched(
         self, number: int | Int[Array, ""], u: Float[Array, " n"], parameters: PyTree
     ) -> Float[Array, ""]:
-        """Return the value of a single monitor, given its index in `monitors`.
+        """Return the value of one monitor, given its index in `monitors`.
 
         With a traced index, one program finds the zeros of all monitors. If one of the
         monitors has `bracket`, indices are integers. Override this method if one value
@@ -259,12 +259,12 @@ class AbstractProblem(eqx.Module):
     def transition(self, point: Any, at: Any) -> Start | None:
         """Return the problem with which to continue from a special point.
 
-        It is called in three cases. At the zero of a monitor that ends this problem,
-        return the problem beyond it (with the same `parameters`). When a branch is
-        switched at a flip, return a problem whose solutions include this orbit
-        traversed twice, its state, and the tangent (the eigenvector of -1, with
-        parameter component 0). At a Hopf point, return the limit cycle that emerges
-        there.
+        This method is called in three cases. At the zero of a monitor that ends this
+        problem, return the problem beyond the zero (with the same `parameters`). When a
+        branch is switched at a flip, return a problem whose solutions include this
+        orbit traversed twice, the state of that solution, and the tangent (the
+        eigenvector of -1, with parameter component 0). At a Hopf point, return the
+        limit cycle that emerges there.
 
         Args:
             point: The [`continuation.Point`][].
@@ -280,7 +280,7 @@ class AbstractProblem(eqx.Module):
     def accumulation(self, points: Sequence[Any]) -> Start | None:
         """Return the problem beyond infinitely many transitions, if they accumulate.
 
-        It is called before `transition`.
+        This method is called before `transition`.
 
         Args:
             points: The special points at which the problem has changed so far.

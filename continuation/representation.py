@@ -31,8 +31,8 @@ class AbstractRepresentation(eqx.Module):
             tangent: Tangent of the branch, `(n,)`.
 
         Returns:
-            The family, state `(n,)` and tangent `(n,)` of each. A branch that meets any
-                of them again is closed.
+            The family, state `(n,)` and tangent `(n,)` of each representation. A branch
+                that meets one of the representations again is closed.
         """
 
     @abc.abstractmethod
@@ -47,7 +47,7 @@ class AbstractRepresentation(eqx.Module):
             u: Unknowns of the equations, shape `(u,)`.
 
         Returns:
-            Shape `(k, n)`.
+            Solutions, shape `(k, n)`.
         """
 
     @abc.abstractmethod

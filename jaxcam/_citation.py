@@ -41,12 +41,12 @@ def citation(*names: str) -> str:
     """Return the BibTeX entries for the given topics.
 
     Choose the topics that apply to your work. `print(jaxcam.citation())` prints the
-    entry of this package and a list of all topics, in lines that BibTeX ignores.
+    entry of this package, and lists all topics in lines that BibTeX ignores.
     `jaxcam.citation("chatter", "saltation")` returns the entries for both topics,
     without duplicates.
 
     Args:
-        *names: Topics, or keys of single entries such as "nordmark1991";
+        *names: Topics, or keys of individual entries, such as "nordmark1991";
             case-insensitive.
 
     Returns:

@@ -306,7 +306,7 @@ def test_demo_compares_the_shipped_recording(demonstration):
     assert found == json.loads((folder / "again.json").read_text())
     assert len(found["runs"]) == 3
     modes = {row["mode"] for row in found["comparison"]["rows"]}
-    assert modes == {"flight", "contact", "impact place", "impact speed"}
+    assert modes == {"flight", "contact", "impact position", "impact speed"}
     for mode in modes:
         assert mode in shown
     # the nominal rig is close to the recorded one, and rests in the same places

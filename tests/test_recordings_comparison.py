@@ -78,7 +78,7 @@ def test_nothing_is_left_where_nothing_is_missing(tmp_path, seed):
     found = compare_case(true_rig(real), recorded(tmp_path, real, seed))
     assert 0.9 < found.row("flight").ratio < 1.15
     assert 0.9 < found.row("contact").ratio < 1.15
-    assert 0.7 < found.row("impact place").ratio < 1.3
+    assert 0.7 < found.row("impact position").ratio < 1.3
     assert 0.7 < found.row("impact speed").ratio < 1.3
 
 
@@ -98,7 +98,7 @@ def test_the_demonstration_runs():
     case = segment_case(read_case(DEMO_RIG), read_rig(DEMO_RIG / "rig.toml"))
     found = compare_case(read_rig(DEMO_RIG / "rig.toml"), case)
     modes = [row.mode for row in found.rows]
-    assert modes == ["flight", "contact", "impact place", "impact speed"]
+    assert modes == ["flight", "contact", "impact position", "impact speed"]
     assert found.row("flight").worst_record in {part.recording.name for part in case}
     assert json.loads(json.dumps(found.to_json()))["rows"][0]["mode"] == "flight"
     assert found.table().row_count == 4
@@ -201,4 +201,4 @@ def test_every_practice_case():
         if "restitution_velocity" in effects:
             assert ratio["impact speed"] > 1.3
         if "cam_profile_error" in effects:
-            assert ratio["flight"] < 1.1 and ratio["impact place"] > 3
+            assert ratio["flight"] < 1.1 and ratio["impact position"] > 3

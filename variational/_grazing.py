@@ -89,8 +89,8 @@ class GrazingForm(eqx.Module):
 
     @property
     def coefficient(self) -> Float[Array, ""]:
-        """The change H_x N b of the smallest gap one period later, for a unit square
-        root.
+        """The change H_x N b of the smallest gap one period later, per unit of the
+        square root of the penetration depth.
         """
         return self.normal @ self.matrix @ self.zero_time
 

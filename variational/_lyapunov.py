@@ -96,8 +96,8 @@ def lyapunov_spectrum(
 
     Returns:
         A `LyapunovSpectrum`; exponents are minus infinity if the motion sticks. With
-            XLA, exponents are NaN if rounding hides the growth of a vector over a
-            period, relative to that of the others.
+            XLA, exponents are NaN if a tangent vector grows so much less than the
+            others in one period that rounding hides its growth.
 
     Raises:
         ValueError: Shapes are inconsistent, there is no period, or a switching surface

@@ -29,26 +29,27 @@ def switching_saltation(
 
         S = R_x + (F+ - R_t - R_x F-) h_x / (h_t + h_x F-),
 
-    which includes the explicit dependence on time. Where the field is continuous, as in
-    a bilinear oscillator, S is the identity. At the beginning of sliding, the rank of S
-    falls by one, because perturbations are projected onto the surface. At the end of
-    sliding, h is the function that falls to zero there, and S is the identity unless
-    `holding` exceeds one. (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, chapter 7)
+    where subscripts denote partial derivatives, including those with respect to time.
+    Where the field is continuous, as in a bilinear oscillator, S is the identity. At
+    the beginning of sliding, the rank of S falls by one, because perturbations are
+    projected onto the surface. At the end of sliding, h is the function whose zero ends
+    the sliding, and S is the identity unless `holding` exceeds one. (R. I. Leine, H.
+    Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, chapter
+    7)
 
     Args:
         system: The system.
         t: Time of the event (s).
         state: State at the event, shape `(n,)`.
-        sides: Sides of all surfaces before the event, +1 or -1, or 0 while the motion
-            slides, shape `(k,)`. If they are traced, the event is taken to be a
-            crossing.
+        sides: Side of each surface on which the motion is before the event, +1 or -1,
+            or 0 while it slides along the surface, shape `(k,)`. If the values are
+            traced, the event is taken to be a crossing.
         surface: Index of the surface of the event.
         after: Side of this surface after the event, 0 if sliding begins; default: the
             other side.
 
     Returns:
-        Shape `(n, n)`.
+        The matrix, shape `(n, n)`.
 
     Raises:
         ValueError: The motion slides before the event and `after` is not given.

@@ -135,7 +135,7 @@ def saltation_into_contact(
         constraint: Index of the constraint.
 
     Returns:
-        Shape `(n, n)`.
+        The matrix, shape `(n, n)`.
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)
@@ -170,7 +170,7 @@ def saltation_at_release(
         constraint: Index of the constraint.
 
     Returns:
-        Shape `(n, n)`.
+        The matrix, shape `(n, n)`.
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)
@@ -236,7 +236,7 @@ def saltation_second(
         constraint: Index of the constraint.
 
     Returns:
-        Shape `(n, n, n)`.
+        The derivative B, shape `(n, n, n)`.
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)

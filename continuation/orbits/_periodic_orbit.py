@@ -60,8 +60,8 @@ def periodic_orbit(
 
     Args:
         system: A [`jaxcam.hybrid.HybridSystem`][], with or without forcing.
-        guess: State at `t0`, shape `(n,)`. By default, the state reached after several
-            hundred forcing periods, which lies on a stable orbit.
+        guess: State at `t0`, shape `(n,)`. By default, the state on a stable orbit that
+            is reached after several hundred forcing periods.
         period: Period of the orbit (s); for a system without forcing, an initial guess.
         periods: Period of the orbit in forcing periods, instead of `period`. The
             default is 1; without a guess, the number is detected.

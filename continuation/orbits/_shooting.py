@@ -52,7 +52,7 @@ class ImpactingOrbits(AbstractOrbits):
     parameters: HybridSystem
     """The [`jaxcam.hybrid.HybridSystem`][]."""
     constraints: tuple[int, ...] = eqx.field(static=True)
-    """Constraint hit by each impact, in order."""
+    """Constraint hit at each impact, in order."""
     periods: int = eqx.field(static=True)
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: int = eqx.field(static=True)

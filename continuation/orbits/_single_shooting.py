@@ -34,7 +34,7 @@ class SingleShooting(AbstractProblem):
     The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or,
     without forcing, the state and the period (s), shape `(n + 1,)`. The equations
     require that a simulation return to the state and, without forcing, that the state
-    lie in a plane perpendicular to the motion, which is updated at each point of a
+    lie in a plane perpendicular to the motion; the plane is updated at each point of a
     branch. One compiled program computes orbits with any number of impacts, crossings
     and sliding phases. The Jacobian contains the saltation matrices of all events.
     Points at which the sequence of events changes are located and named: `"grazing"`,
@@ -159,7 +159,7 @@ class SingleShooting(AbstractProblem):
             u: Unknowns of the equations, shape `(u,)`.
 
         Returns:
-            Shape `(u,)`.
+            Scales, shape `(u,)`.
         """
         sizes = self._sizes(u, parameters)
         return sizes if self.periods else jnp.append(sizes, u[-1])

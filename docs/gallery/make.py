@@ -28,8 +28,13 @@ PAGE = HERE.parent / "gallery.md"
 OUT = HERE
 # of the figures on the page, from top to bottom
 ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
-# where the name of a script alone would lack a hyphen
-TITLES = {"cam_follower_chart": "Cam-follower chart", "stick_slip": "Stick-slip"}
+# where the name of a script is not a good title
+TITLES = {
+    "cam_follower_chart": "Cam-follower chart",
+    "curves_in_two_parameters": "Bifurcation curves in the plane of two parameters",
+    "fit_with_band": "Fit with noise band",
+    "stick_slip": "Stick-slip",
+}
 # dots per inch
 DOTS = 130
 # number of colours of a picture, few enough for a small file

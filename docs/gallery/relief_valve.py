@@ -1,5 +1,5 @@
-"""Maxima of the lift of a relief valve without forcing, as a function of the flow: the
-valve hits its seat at small flows and comes to rest at large flows."""
+"""Maxima of the lift of a relief valve without forcing, as a function of the flow
+rate: the valve hits its seat at low flow rates and comes to rest at high flow rates."""
 
 import numpy as np
 

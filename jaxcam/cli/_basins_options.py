@@ -42,8 +42,8 @@ class Cells:
         typer.Option(
             metavar="N",
             help=(
-                "Number of times to double the length of a simulation that is not yet "
-                "periodic."
+                "Number of times to double the length of a simulation whose motion is "
+                "not yet periodic."
             ),
         ),
     ] = 1

@@ -82,7 +82,7 @@ class Following:
         typer.Option(
             metavar="A,B",
             help=(
-                "Initial guess of the orbit's state at time zero, such as 0.3,0. "
+                "Initial guess for the orbit's state at time zero, such as 0.3,0. "
                 "Default: the orbit to which the motion converges."
             ),
         ),

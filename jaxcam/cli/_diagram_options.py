@@ -101,7 +101,7 @@ class Starts:
     state: Annotated[
         str | None,
         typer.Option(
-            metavar="A,B", help="Initial state; default: in sustained contact."
+            metavar="A,B", help="Initial state; default: a state in sustained contact."
         ),
     ] = None
     starts: Annotated[

@@ -34,7 +34,10 @@ class Files:
         str | None,
         typer.Option(
             metavar="COLUMN",
-            help="Column that numbers the recordings, for files that contain several.",
+            help=(
+                "Column with the recording number, for files that contain several "
+                "recordings."
+            ),
         ),
     ] = None
 

@@ -29,7 +29,7 @@ def fit(
             "--json",
             metavar="FILE",
             help=(
-                "Write the fitted system and its standard errors, for use as "
+                "Write the fitted system and its standard errors to FILE, for use with "
                 "--system; - prints them."
             ),
         ),

@@ -44,7 +44,10 @@ Assignments: TypeAlias = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="A parameter in SI units, such as restitution.r=0.6; can be repeated.",
+        help=(
+            "Set a parameter (value in SI units), such as restitution.r=0.6; can be "
+            "repeated."
+        ),
     ),
 ]
 Speed: TypeAlias = Annotated[
@@ -85,7 +88,10 @@ JsonFile: TypeAlias = Annotated[
 ]
 Resume: TypeAlias = Annotated[
     bool,
-    typer.Option("--resume", help="Resume the interrupted command in --out DIR."),
+    typer.Option(
+        "--resume",
+        help="Resume an interrupted run from the results stored in --out DIR.",
+    ),
 ]
 Case: TypeAlias = Annotated[
     Path,

@@ -31,7 +31,10 @@ def reproduce(
         str,
         typer.Option(
             metavar="NAME",
-            help="default, or full: diagrams and basins at the published resolution.",
+            help=(
+                "Resolution of diagrams and basins: default, or full for that of the "
+                "thesis."
+            ),
         ),
     ] = _SIZES[0],
     list_: Annotated[

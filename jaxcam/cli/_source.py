@@ -31,7 +31,7 @@ class Source:
         """Return the saved system, or the one in a Python file with its nominal values.
 
         Raises:
-            ValueError: A file is invalid; the message names it and the fix.
+            ValueError: A file is invalid; the message gives its name and the remedy.
         """
         from ..fitting import is_setup, read_setup
         from ..fitting.own_systems import stated_system, system_class

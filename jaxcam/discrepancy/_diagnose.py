@@ -42,13 +42,14 @@ def diagnose(
     """Determine from recordings which physics a model lacks.
 
     A diagnosis takes minutes; the notebooks contain an example. Terms of the library
-    and forces are sought at the first coordinate and the first gap, and functions at
-    impacts at the first two gaps. Other coordinates and gaps are tried only if a
-    residual above the noise remains; each of them takes as long again.
+    and unknown forces are sought at the first coordinate and the first gap, and unknown
+    functions that act at impacts are sought at the first two gaps. Other coordinates
+    and gaps are tried only if a residual above the noise remains; each such additional
+    search takes as long again.
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from
-            `jaxcam.fitting.read_setup`, which include sensors and tolerances; or a
+            `jaxcam.fitting.read_setup`, each with sensors and tolerances; or a
             bare system: any system with at least one coordinate, together with
             `sensors`, `parameters` and `drive`.
         recordings: At least two recordings of a rig; for a bare system, segments from

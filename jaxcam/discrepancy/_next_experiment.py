@@ -43,7 +43,7 @@ class Experiment:
     the rms of its error band.
     """
     then: Mapping[str, float]
-    """The same with the recording."""
+    """Standard errors with the recording, in the same form."""
     speed: float | None = None
     """Speed of the cam (rad/s), if there is one."""
 
@@ -71,10 +71,10 @@ def compare_experiments(
         records: Recordings simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and segmented.
         asked: Names of the parameters to be determined. The default is the strengths of
-            the named terms and the values of unnamed functions. Alternative terms whose
-            BIC is not much worse stay free, so that the best recording also
-            distinguishes them from the named ones. If the verdict is `none`, the
-            default is all terms, one at a time.
+            the named terms and the values of the functions found for effects outside
+            the library. Alternative terms whose BIC is not much higher stay free, so
+            that the best recording also distinguishes them from the named ones. If the
+            verdict is `none`, the default is all terms, one at a time.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:
@@ -82,7 +82,8 @@ def compare_experiments(
 
     Raises:
         ValueError: A name is not a parameter, or a force with an internal state was
-            found, whose excitation is known only for the existing recordings.
+            found; the excitation of such a force is known only for the existing
+            recordings.
     """
     _refuse_hidden(found)
     report = progress or (lambda sentence, fraction: None)

@@ -52,14 +52,14 @@ def predictions(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Prediction, ...]:
-    """Predict the speeds at which the motion of a cam-follower rig changes, with both
-    models.
+    """Predict the speeds at which the motion of a cam-follower rig changes.
 
-    These are the speeds of detachment (valve float), of the fold and the flip of
+    The speeds are predicted with the refitted textbook model, without and with the
+    missing effects: those of detachment (valve float), of the fold and the flip of
     P(1,1), and of the interruption of complete chatter. Their standard errors are
     estimated from random rigs, drawn from the distribution of the fitted parameters.
-    The second model includes the named terms except those with a frequency of their
-    own, because the motion is then not periodic with the cam.
+    Of the missing effects, terms with a frequency of their own are left out, because
+    with such a term the motion is not periodic with the cam.
 
     Args:
         found: The diagnosis.

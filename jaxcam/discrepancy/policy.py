@@ -80,18 +80,20 @@ class Policy:
         "the fraction of the explained cost that may remain",
     )
     form_loss: float = _decides(10.0, "loss in BIC up to which a formula is kept")
-    elsewhere: float = _decides(0.5, "share of a residual another place may leave")
+    elsewhere: float = _decides(
+        0.5,
+        "another location is chosen if it leaves less than this fraction of a residual",
+    )
     corner_share: float = _decides(
         3e-4,
-        "fraction of the explained cost that the smoothing of dry friction at zero "
-        "velocity may leave; next to a friction term, a term that explains less is not "
-        "named",
+        "maximum fraction of the explained cost due to the smoothing of dry friction; "
+        "a term that explains less is not named together with a friction term",
     )
     differs: float = _decides(
         0.5, "minimum fraction of the misfit that separate values must explain"
     )
     as_much: float = _decides(
-        0.9, "fraction of their gain above which a common function is sought"
+        0.9, "minimum gain of a common function, relative to that of separate values"
     )
     near: float = _decides(
         4.0, "cost per sample below which a fit counts as near the data"
@@ -109,7 +111,7 @@ class Policy:
     untold: float = _decides(
         1e-3,
         "minimum fraction of the information on a term that one half of the recordings "
-        "must contain to estimate it",
+        "must contain to estimate the term",
     )
     stretches: int = _decides(4, "maximum number of bootstrap blocks per recording")
     stretch_pieces: int = _decides(
@@ -117,7 +119,7 @@ class Policy:
     )
     folds: int = _decides(3, "number of parts of the data in the cross-validation")
     fewest_periods: float = _decides(
-        4.0, "minimum periods of a vibration in the longest recording"
+        4.0, "minimum number of periods of a vibration in the longest recording"
     )
     period_samples: float = _decides(20.0, "minimum samples per period of a vibration")
     period_steps: float = _decides(
@@ -127,33 +129,32 @@ class Policy:
         20, "number of lags (samples) in the autocorrelation test of the residuals"
     )
     residual_stretches: int = _decides(
-        4, "sections per recording in that test; the worst one is ignored"
+        4, "number of sections per recording in that test; the worst section is ignored"
     )
     velocity_tail: float = _decides(
         0.005, "fraction of velocities beyond each end of a velocity function's range"
     )
     drive_wander: float = _decides(
         0.75,
-        "multiple of the drive's frequency below which its variations are speed drift",
+        "multiple of the rotation frequency below which speed changes count as drift",
     )
     drive_degree: int = _decides(
         5, "degree of the polynomial for speed drift near the ends of a recording"
     )
     drive_orders: tuple[float, ...] = _decides(
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),
-        "non-harmonic multiples of the drive's frequency at which leakage is measured",
+        "non-harmonic multiples of the rotation frequency at which leakage is measured",
     )
-
     odd: float = _decides(
         10.0,
-        "ratio of the cost per sample of one recording to that of any other above "
-        "which the recording is excluded",
+        "a recording is excluded if its cost per sample is at least this many times "
+        "that of any other recording",
     )
     records_apart: int = _decides(
         4, "minimum number of recordings for one to be excluded"
     )
     noisier: float = _decides(
-        1.2, "ratio of measured to stated noise above which the former is used"
+        1.2, "ratio of measured to stated noise above which the measured noise is used"
     )
 
     # settings that limit the search
@@ -168,7 +169,7 @@ class Policy:
         12, "maximum Newton steps when only states are fitted"
     )
     state_gain: float = _bounds(
-        1e-3, "reduction of the cost below which these steps end"
+        1e-3, "reduction of the cost below which these Newton steps end"
     )
     kept: int = _bounds(3, "number of subsets of each size that are extended")
     tried: int = _bounds(6, "number of subsets fitted at each size above one")
@@ -176,15 +177,14 @@ class Policy:
         50.0, "difference in BIC up to which a subset or a form is followed further"
     )
     helped: float = _bounds(
-        0.7, "maximum fraction of the cost left by a term for the search to go on"
+        0.7, "ratio of the costs with and without a term below which the search goes on"
     )
     clear: float = _bounds(
-        10.0,
-        "multiple of the required gain beyond which the loss without a term is not "
-        "computed more accurately",
+        10.0, "multiple of the required gain above which a loss of fit is not refined"
     )
     astray: float = _bounds(
-        3.0, "prior standard deviations beyond which a fit restarts from nominal values"
+        3.0,
+        "parameter shift, in prior standard deviations, beyond which a fit restarts",
     )
     hopeless: float = _bounds(
         2.0, "multiple of the smallest cost above which a fit is not refined further"
@@ -199,16 +199,16 @@ class Policy:
         4, "minimum number of step attempts during these steps"
     )
     crawl_gain: float = _bounds(
-        0.01, "fraction of the remaining cost below which these steps are slow"
+        0.01, "relative reduction of the cost below which these steps count as slow"
     )
     late: int = _bounds(
-        8, "attempts after which a fit must be better than the subset it extends"
+        8, "step attempts after which the cost must be below that of the smaller subset"
     )
     functions: int = _bounds(
         2, "maximum number of free functions for unknown physics; 0: none"
     )
     elements: int = _bounds(
-        1, "internal states; 0: never, 1: if functions may not suffice, 2: always"
+        1, "use of elements with internal states; 0: never, 1: if needed, 2: always"
     )
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
@@ -226,7 +226,7 @@ class Policy:
     followed: int = _bounds(
         3, "maximum number of free functions, terms and forms fitted per stage"
     )
-    outdone: float = _bounds(1.25, "multiple of the curve's cost that a form must beat")
+    outdone: float = _bounds(1.25, "maximum cost of a form, relative to the curve's")
     enough: float = _bounds(
         0.1, "fraction of the tolerated residual below which the search ends"
     )
@@ -247,8 +247,8 @@ class Policy:
     )
     cause_strengths: tuple[float, float, int] = _bounds(
         (0.1, 1.5, 24),
-        "strengths tried in a fit to event speeds: the first, the ratio of consecutive "
-        "ones, and their number",
+        "strengths tried in a fit to event speeds: the first strength, the ratio of "
+        "consecutive strengths, and their number",
     )
     cause_worse: float = _bounds(
         4.0, "multiple of the smallest misfit above which this series ends"
@@ -277,7 +277,7 @@ class Policy:
 
     # settings of the report
     ripple_errors: float = _shows(
-        3.0, "standard errors above which a recording shows ripple"
+        3.0, "ripple amplitude, in standard errors, above which a recording is listed"
     )
     shown_chance: float = _shows(
         1e-3, "significance level at which a recording shows a named effect"
@@ -290,27 +290,27 @@ class Policy:
     )
     tie: float = _shows(
         10.0,
-        "difference in BIC up to which another subset is reported as equally good "
-        "(above it, evidence is very strong: Kass and Raftery 1995)",
+        "difference in BIC up to which another subset is reported as equally good (a "
+        "larger difference is very strong evidence: Kass and Raftery 1995)",
     )
     moved_errors: float = _shows(
-        3.0, "standard errors above which the summary reports a shifted parameter"
+        3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
     rival: float = _shows(
-        30.0, "difference in BIC up to which the next experiment tests another term"
+        30.0, "difference in BIC up to which the next recording tests another term"
     )
     absent_errors: float = _shows(
-        10.0, "residual of an event that no longer exists, in standard errors"
+        10.0, "residual, in standard errors, assigned to an event that does not occur"
     )
     cost_errors: float = _bounds(
-        3.0, "standard deviations above which an excess of cost is not noise"
+        3.0, "excess cost, in standard deviations, above which it is not due to noise"
     )
     nearby: float = _shows(
         0.03,
-        "distance within which data count as near a point, as a fraction of the range",
+        "distance, as a fraction of the range, within which data count as near a point",
     )
     visited: float = _shows(
-        0.1, "minimum data density at which a function is shown, relative to uniform"
+        0.1, "minimum data density, relative to uniform, at which a function is shown"
     )
     shape_points: int = _shows(48, "number of points at which a free function is shown")
     several: int = _shows(6, "maximum number of recordings whose values are listed")

@@ -53,7 +53,7 @@ def sliding_field(
         state: State, shape `(n,)`.
 
     Returns:
-        Shape `(n,)`.
+        The sliding field, shape `(n,)`.
     """
     share = sliding_share(system, t, state)
     return share * system.above(t, state) + (1 - share) * system.below(t, state)

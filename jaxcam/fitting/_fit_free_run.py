@@ -54,9 +54,9 @@ def fit_free_run(
 
     `fit` compares each piece of a recording with a prediction from the preceding piece,
     and estimates the standard error of each parameter. This function minimises the
-    error of a simulation of the complete recording, which starts from the first
-    samples. The effect of a model discrepancy accumulates in the simulation and biases
-    the parameters, so no standard errors are given. Channels are weighted by the
+    error of a simulation that starts from the first samples and covers the complete
+    recording. The effect of a model discrepancy accumulates in the simulation and
+    biases the parameters, so no standard errors are given. Channels are weighted by the
     inverse of their noise.
 
     Args:

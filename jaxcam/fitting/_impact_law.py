@@ -57,7 +57,7 @@ class ImpactLaw:
     p_value: float
     """p-value of the F test of the power law against a constant coefficient."""
     scatter: float
-    """Standard deviation of single impacts, in `scatter_unit`."""
+    """Standard deviation of individual impacts, in `scatter_unit`."""
     scatter_unit: str
     """Unit of the scatter: that of the speed, `"1"` for the restitution, or `"stated"`
     for the standard errors in the table.
@@ -166,12 +166,12 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     """Return the restitution law that a table of impacts supports.
 
     A constant coefficient of restitution and a power law, r = r0 (1 + v / v_ref)^-b
-    with the median speed as v_ref, are fitted by least squares. The scatter of single
-    impacts is estimated from the data: the standard deviation of either the separation
-    speed or the coefficient of restitution is assumed to be constant, whichever is more
-    likely. If the table states standard errors, the scatter is assumed to be
-    proportional to them. The power law is chosen if an F test rejects a constant
-    coefficient at the 1 % level.
+    with the median speed as v_ref, are fitted by least squares. The scatter of
+    individual impacts is estimated from the data: either the separation speed or the
+    coefficient of restitution is assumed to have a constant standard deviation,
+    whichever is more likely. If the table states standard errors, the scatter is
+    assumed to be proportional to them. The power law is chosen if an F test rejects a
+    constant coefficient at the 1 % level.
 
     Args:
         table: The impacts.

@@ -72,7 +72,7 @@ def profile(
         values: Values at which to fix the parameter instead, in any order; a value is
             inside the 95 % interval if its cost is below 3.84.
         weights: Weight of each piece of the data; use the same value as for `found`.
-        prior: Whether tolerances count as prior knowledge; use the value used for
+        prior: Whether tolerances count as prior knowledge; use the same value as for
             `found`.
         progress: Called with the number of completed values and the total number.
 
@@ -143,7 +143,7 @@ def excess_cost(
         found: The fit, in which all parameters in `values` were free.
         values: Values by name.
         weights: Weight of each piece of the data; use the same value as for `found`.
-        prior: Whether tolerances count as prior knowledge; use the value used for
+        prior: Whether tolerances count as prior knowledge; use the same value as for
             `found`.
 
     Returns:

@@ -40,11 +40,11 @@ class RestitutionFit:
     law: eqx.Module
     """The fitted law, a module that can be passed to `CamFollower(restitution=...)`."""
     names: tuple[str, ...]
-    """Names of its parameters."""
+    """Names of the fitted parameters of the law."""
     values: Float[np.ndarray, " p"]
-    """Their values."""
+    """Values of these parameters."""
     stderr: Float[np.ndarray, " p"]
-    """Their standard errors."""
+    """Standard errors of these values."""
     cost: float
     """Sum of squared residuals in units of the standard errors, with Huber's loss
     function.

@@ -32,13 +32,13 @@ class Setup:
     drive_channel: str | None = None
     """Channel of the encoder of a rotating drive (rad), or `None`."""
     references: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Constants of missing-physics terms that the rig file states, by the field names
-    of `jaxcam.recordings.References`, in the units of the motion; constants that it
-    does not state follow from the speeds of the motion.
+    """Constants in the library of effects, as stated in the rig file: keyed by the
+    field names of `jaxcam.recordings.References`, in the units of the motion. Constants
+    that the file does not state follow from the speeds of the motion.
     """
     records: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    """Known constants of single recordings, by patterns of their names: `{"run3*":
-    {"mass": 0.31}}`; if several patterns match, the last one counts.
+    """Known constants of individual recordings, keyed by patterns of recording names:
+    `{"run3*": {"mass": 0.31}}`; if several patterns match, the last one counts.
     """
     files: FileLayout = FileLayout()
     """Column names and sampling rate of the recordings."""

@@ -54,7 +54,8 @@ class SwitchedSystem(HybridSystem):
             state: State, shape `(n,)`.
 
         Returns:
-            A scalar, or shape `(k,)` for k surfaces; smooth in time and state.
+            The value, a scalar, or shape `(k,)` for k surfaces; smooth in time and
+                state.
         """
 
     @abc.abstractmethod
@@ -108,7 +109,7 @@ class SwitchedSystem(HybridSystem):
 
     @property
     def hysteresis(self) -> Any:
-        """Return how far a switching function passes beyond zero before it switches.
+        """Return how far a switching function goes beyond zero before the side changes.
 
         The result is a number or has shape `(k,)`; the default is zero. A motion on the
         positive side switches where the function falls to -hysteresis, and a motion on
@@ -142,10 +143,10 @@ class SwitchedSystem(HybridSystem):
         velocities, with all of the friction acting against the slip after the impact,
         as in time-stepping schemes; the result differs if the slip reverses.
 
-        An impact while other gaps are closed is treated as an impact on all of these
-        constraints, in systems with up to three constraints and more than three states:
-        with Newton's coefficient for `"kinematic"` and `"complementarity"`, otherwise
-        with Poisson's.
+        In systems with up to three constraints and more than three states, an impact
+        that occurs while other gaps are closed is treated as an impact on all of these
+        constraints. The coefficient is then Newton's for `"kinematic"` and
+        `"complementarity"`, otherwise Poisson's.
         """
         return "kinematic"
 
@@ -172,9 +173,10 @@ class SwitchedSystem(HybridSystem):
         `-mu * sides[0]`. At zero slip the body sticks as long as the required friction
         force is less than mu times the normal force. `impact` is then the law without
         friction, from which the coefficient of restitution follows; `restitution_kind`
-        determines its meaning. During an impact, the body slips until friction has
+        defines this coefficient. During an impact, the body slips until friction has
         stopped it; then it sticks, or slips back if friction is too weak. The friction
-        of a constraint must act against one switching function, its slip velocity.
+        of a constraint must oppose one slip velocity, which must be one of the
+        switching functions.
 
         Args:
             t: Time (s).
@@ -200,8 +202,8 @@ class SwitchedSystem(HybridSystem):
             sides: Sides before the crossing, shape `(k,)`.
 
         Returns:
-            Shape `(n,)` for a scalar `switching`, otherwise `(k, n)`, one row per
-                surface.
+            State after the crossing, shape `(n,)`, for a scalar `switching`; otherwise
+                one row per surface, shape `(k, n)`.
         """
         del sides
         shape = jnp.shape(self.switching(t, state))

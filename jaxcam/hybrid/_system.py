@@ -75,7 +75,7 @@ class HybridSystem(eqx.Module):
             state: State, shape `(n,)`.
 
         Returns:
-            A scalar, or shape `(m,)` for m constraints.
+            The gap, a scalar, or shape `(m,)` for m constraints.
         """
 
     @abc.abstractmethod
@@ -133,7 +133,7 @@ class HybridSystem(eqx.Module):
         return self
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning.
+        """Raise `ValueError` if a parameter has an unphysical value.
 
         It is called with concrete parameters before a simulation starts.
         """

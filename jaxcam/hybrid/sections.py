@@ -111,7 +111,7 @@ class WithSection(SwitchedSystem):
         return eqx.tree_at(lambda s: s.system, self, self.system.prepared())
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter of the system has no physical meaning."""
+        """Raise `ValueError` if a parameter of the system has an unphysical value."""
         self.system.check()
 
     def _own(self, t, state, name: str, otherwise):

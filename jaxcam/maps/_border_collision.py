@@ -79,8 +79,8 @@ def border_collision(
     Args:
         system: A continuous map.
         where: Selects the parameter.
-        guess: Initial guess of the parameter.
-        state: Initial guess of the fixed point.
+        guess: Initial guess for the parameter.
+        state: Initial guess for the fixed point.
 
     Returns:
         A `BorderCollision`.

@@ -29,11 +29,11 @@ def superstable(
         system: The map, a module.
         where: Selects the parameter.
         critical: The critical point.
-        first: Initial guesses of the first two parameters.
+        first: Initial guesses for the first two parameters.
         count: Number of parameters.
 
     Returns:
-        Shape `(count,)`.
+        The parameter values, shape `(count,)`.
 
     Raises:
         ValueError: Newton's method does not converge; rounding limits `count` to about
@@ -71,7 +71,7 @@ def feigenbaum_ratios(parameters: Float[np.ndarray, " n"]) -> Float[np.ndarray, 
         parameters: Parameters m_k of a period-doubling cascade, shape `(n,)`.
 
     Returns:
-        Shape `(n - 2,)`.
+        Ratios, shape `(n - 2,)`.
 
     Examples:
         >>> from jaxcam.maps import feigenbaum_ratios

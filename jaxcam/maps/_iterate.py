@@ -51,7 +51,7 @@ def map_diagram(
         keep: Number of iterates to keep.
 
     Returns:
-        Shape `(values, keep)`.
+        Iterates, shape `(values, keep)`.
 
     Examples:
         >>> from jaxcam.maps import LogisticMap, map_diagram

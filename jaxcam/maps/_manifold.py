@@ -39,7 +39,7 @@ def saddle_at(system: Callable, guess: VectorLike) -> Saddle:
 
     Args:
         system: A planar map.
-        guess: Initial guess of the saddle, shape `(2,)`.
+        guess: Initial guess for the saddle, shape `(2,)`.
 
     Returns:
         A [`jaxcam.maps.Saddle`][].

@@ -70,7 +70,7 @@ class BeltOscillator(FilippovSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(friction=self.friction, omega=self.omega)
         require_not_negative(weakening=self.weakening, damping=self.damping)
         require_finite(belt=self.belt, amplitude=self.amplitude)

@@ -71,7 +71,7 @@ class BilinearOscillator(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(stiffness=self.stiffness, omega=self.omega)
         require_finite(stop=self.stop, amplitude=self.amplitude)
         require_not_negative(damping=self.damping)

@@ -63,7 +63,7 @@ class BouncingBall(HybridSystem):
         return 2 * jnp.pi / self.frequency
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(gravity=self.gravity, frequency=self.frequency)
         require_restitution(self.restitution)
         require_finite(amplitude=self.amplitude)

@@ -53,10 +53,10 @@ class CamFollower(AbstractCamDriven):
     spring_hook_x: jax.Array = parameter(-0.031)
     """x-coordinate of the suspension point of the spring, x_A (m)."""
     spring_elongation: jax.Array = parameter(0.173)
-    """y_A - d_0 - d_1 in the notation of the thesis (m)."""
+    """Elongation of the spring, y_A - d_0 - d_1 in the notation of the thesis (m)."""
     spring_half_height: jax.Array = parameter(0.021)
-    """d in the spring torque (m). The half height that determines the contact angle
-    belongs to the profile, so that both can be fitted separately.
+    """Half height d in the spring torque (m). The half height that determines the
+    contact angle belongs to the profile, so that both can be fitted separately.
     """
     profile: CamProfile = eqx.field(default_factory=EccentricCircle)
     """Contact angle as a function of the cam angle, a
@@ -136,7 +136,7 @@ class CamFollower(AbstractCamDriven):
         return self.inertia * curvature, jnp.zeros_like(slope), spring
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(
             speed=self.speed, inertia=self.inertia, stiffness=self.stiffness
         )

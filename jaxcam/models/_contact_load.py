@@ -43,7 +43,7 @@ def contact_load(
             `(angles,)`.
 
     Returns:
-        Shape `(angles,)`.
+        Loads, shape `(angles,)`.
 
     Examples:
         >>> from jaxcam.models import CamFollower, contact_load
@@ -62,10 +62,10 @@ def contact_force(
     *,
     center: tuple | None = None,
 ) -> Float[Array, " angles"]:
-    """Return the normal contact force (N); for a hinged follower, torque divided by
-    lever arm.
+    """Return the normal contact force (N).
 
-    The lever arm is l in the thesis, eq. 4.19.
+    For a hinged follower, this is the torque divided by the lever arm, which is l in
+    the thesis, eq. 4.19.
 
     Args:
         system: The system.
@@ -75,7 +75,7 @@ def contact_force(
             eccentric circle.
 
     Returns:
-        Shape `(angles,)`.
+        Contact forces, shape `(angles,)`.
 
     Raises:
         ValueError: The axis is unknown.
@@ -101,8 +101,8 @@ def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
 
     It is the smallest root, over all cam angles, of the contact load as a function of
     the speed. At the joints of a motion program, the accelerations on both sides are
-    considered; if the slope of the lift falls at a joint, the follower leaves the cam
-    at any speed. The result is differentiable in the parameters.
+    considered; if the slope of the lift jumps down at a joint, the follower leaves the
+    cam at any speed. The result is differentiable in the parameters.
 
     Args:
         system: The system.

@@ -79,7 +79,7 @@ class DesmodromicCam(AbstractCamDriven):
         return jnp.stack([after, after])
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(speed=self.speed, clearance=self.clearance, mass=self.mass)
         require_not_negative(stiffness=self.stiffness, damping=self.damping)
         require_finite(preload=self.preload, phase=self.phase)

@@ -64,6 +64,6 @@ class DryFrictionOscillator(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(omega=self.omega)
         require_not_negative(friction=self.friction, amplitude=self.amplitude)

@@ -68,7 +68,7 @@ class ForcedOscillator(eqx.Module):
         return jax.scipy.linalg.expm(matrix * duration)
 
     def solution(self, time, state: Float[Array, " 3"]) -> Float[Array, " 3"]:
-        """Return the exact state at a `time` after `state`, shape `(3,)`."""
+        """Return the exact state reached after `time` from `state`, shape `(3,)`."""
         start = state[2]
         moved = self.propagator(time) @ (state[:2] - self.steady(start))
         end = start + time

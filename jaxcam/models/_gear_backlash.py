@@ -77,7 +77,7 @@ class GearBacklash(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(clearance=self.clearance, omega=self.omega)
         require_finite(load=self.load, amplitude=self.amplitude)
         require_not_negative(damping=self.damping)

@@ -65,7 +65,7 @@ class ImpactOscillator(HybridSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(omega=self.omega)
         require_restitution(self.restitution)
         require_finite(wall=self.wall)

@@ -102,7 +102,7 @@ class InclinedShaker(SwitchedSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(omega=self.omega, gravity=self.gravity)
         require_restitution(self.restitution)
         require_finite(incline=self.incline, direction=self.direction)

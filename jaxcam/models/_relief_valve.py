@@ -15,12 +15,12 @@ from ._parameters import (
 
 
 class ReliefValve(HybridSystem):
-    """Pressure relief valve fed by a constant flow, dimensionless.
+    """Pressure relief valve supplied at a constant flow rate, dimensionless.
 
     The state is (lift, lift rate, pressure): `x'' + damping x' + x + preload =
     pressure`, and `pressure' = compressibility (flow - x sqrt(pressure))`. The seat is
-    at lift zero. When the flow falls below a Hopf point, the valve begins to oscillate;
-    when the oscillation reaches the seat, the valve hits it.
+    at lift zero. When the flow rate falls below a Hopf point, the valve begins to
+    oscillate; when the oscillation reaches the seat, the valve hits it.
 
     G. Licsko, A. Champneys and C. Hos, Nonlinear analysis of a single stage pressure
     relief valve, IAENG International Journal of Applied Mathematics 39 (2009).
@@ -39,7 +39,7 @@ class ReliefValve(HybridSystem):
     """Units of the state components."""
 
     flow: jax.Array = parameter(7.0)
-    """Flow into the chamber of the valve."""
+    """Flow rate into the chamber of the valve."""
     damping: jax.Array = parameter(1.25)
     """Damping of the valve."""
     preload: jax.Array = parameter(10.0)
@@ -75,7 +75,7 @@ class ReliefValve(HybridSystem):
         return jnp.stack([state[0], -self.restitution * state[1], state[2]])
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(compressibility=self.compressibility, preload=self.preload)
         require_restitution(self.restitution)
         require_not_negative(damping=self.damping, flow=self.flow)

@@ -34,10 +34,10 @@ class LinearInSpeed(eqx.Module):
     """Coefficient of restitution linear in the drive speed, limited to [0, 1].
 
     The thesis identifies such a law (section 4.6.1, Figure 4.15) but does not give its
-    numbers. They follow from its Table 5.2: because free flight is conservative, the
-    product of the two multipliers of an orbit with one impact per period is r^2. The
-    defaults are the line through the ten values of r obtained in this way, rounded
-    (which changes r by 5e-7).
+    coefficients. They follow from Table 5.2 of the thesis: because free flight is
+    conservative, the product of the two multipliers of an orbit with one impact per
+    period is r^2. The defaults are the line through the ten values of r obtained in
+    this way, rounded (which changes r by 5e-7).
 
     Examples:
         >>> from jaxcam.models import LinearInSpeed

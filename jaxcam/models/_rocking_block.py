@@ -31,9 +31,9 @@ class RockingBlock(HybridSystem):
     At small angles, the corner stays on the floor as long as `|a|` is below
     (1 + restitution) / (1 - restitution) g tan(alpha); above this limit, the corner
     leaves the floor, as the corner of a real block does if `restitution` is
-    `housner_restitution`. The contact forces are those of a real block, divided by its
-    mass and `half_width`, only while the block stands. A block that has fallen over is
-    not stopped by the floor.
+    `housner_restitution`. While the block stands, and only then, the contact forces are
+    those of a real block divided by its mass and `half_width`. A block that has fallen
+    over is not stopped by the floor.
 
     G. W. Housner, The behavior of inverted pendulum structures during earthquakes,
     Bulletin of the Seismological Society of America 53 (1963); S. J. Hogan, On the
@@ -111,7 +111,7 @@ class RockingBlock(HybridSystem):
             rate: Rate of the angle (rad/s).
 
         Returns:
-            Shape `(4,)`.
+            The state, shape `(4,)`.
         """
         angle = jnp.asarray(angle, dtype=jnp.float64)
         rate = jnp.asarray(rate, dtype=jnp.float64)
@@ -132,7 +132,7 @@ class RockingBlock(HybridSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(
             half_width=self.half_width,
             half_height=self.half_height,

@@ -87,7 +87,7 @@ class SpinningBall(SwitchedSystem):
         return state.at[3].multiply(-self.restitution)
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(radius=self.radius, inertia=self.inertia, gravity=self.gravity)
         require_restitution(self.restitution)
         require_not_negative(friction_coefficient=self.friction_coefficient)

@@ -42,7 +42,7 @@ class TwoSidedStop(HybridSystem):
     amplitude: jax.Array = parameter(1.0)
     """Amplitude of the forcing."""
     clearance: jax.Array = parameter(0.1)
-    """Distance of each stop from the position of rest."""
+    """Distance of each stop from the equilibrium position."""
     restitution: jax.Array = parameter(0.8)
     """Coefficient of restitution at both stops, between 0 and 1."""
     damping: jax.Array = parameter(0.0)
@@ -73,7 +73,7 @@ class TwoSidedStop(HybridSystem):
         return 2 * jnp.pi / self.omega
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(omega=self.omega, clearance=self.clearance)
         require_restitution(self.restitution)
         require_not_negative(damping=self.damping, amplitude=self.amplitude)

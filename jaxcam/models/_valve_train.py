@@ -89,7 +89,7 @@ class ValveTrain(AbstractCamDriven):
         )
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(speed=self.speed, mass=self.mass)
         require_not_negative(
             stiffness=self.stiffness, preload=self.preload, damping=self.damping

@@ -162,7 +162,7 @@ class WoodpeckerToy(SwitchedSystem):
         return jnp.stack(rows)
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter has no physical meaning."""
+        """Raise `ValueError` if a parameter has an unphysical value."""
         require_positive(
             sleeve_mass=self.sleeve_mass,
             sleeve_inertia=self.sleeve_inertia,

@@ -40,9 +40,9 @@ class Pick:
     """
 
     leaves: tuple[int, ...]
-    """Indices among the leaves of the tree."""
+    """Positions of the selected parameters among the leaves of the tree."""
     names: tuple[str, ...]
-    """Dotted names, such as `speed` or `profile.radius`."""
+    """Dotted names of these parameters, such as `speed` or `profile.radius`."""
     several: bool = False
     """Whether a call returns a tuple."""
 
@@ -139,11 +139,11 @@ def unit_tangent(where: Where, tree: _Tree) -> _Tree:
 
 
 def parameter_names(tree: PyTree, *, integers: bool = False) -> list[str]:
-    """Return the dotted names of all numbers of a tree that can vary.
+    """Return the dotted names of all numbers in a tree that can vary.
 
     Args:
         tree: A system, or any other pytree.
-        integers: Whether integers may vary too.
+        integers: Whether to include integers; default: floating-point numbers only.
 
     Returns:
         A list of names.

@@ -5,11 +5,11 @@ import jax.numpy as jnp
 
 
 def real_array(values, name: str = "state") -> jax.Array:
-    """Return an array of 64-bit floats.
+    """Convert numbers to an array of 64-bit floats.
 
     Args:
         values: Numbers.
-        name: Name of the argument for the message.
+        name: Name of the argument, for the error message.
 
     Returns:
         A real array.

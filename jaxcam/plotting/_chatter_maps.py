@@ -76,7 +76,7 @@ def beta_lobes(
     Args:
         r: Coefficient of restitution.
         ax: Axes to draw on; default: a new figure.
-        measured: Deviations of lambda and values of beta from simulations, drawn below
+        measured: Deviations of lambda and values of beta from simulations, drawn behind
             the theoretical curve.
         lobes: Number of lobes, starting with the largest.
 

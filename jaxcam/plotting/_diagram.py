@@ -160,7 +160,7 @@ def sweep_chart(
     Args:
         chart: The chart from [`jaxcam.sweeps.chart`][].
         ax: Axes to draw on; default: a new figure.
-        start: Index of the start, if there are several.
+        start: Index of the initial state, if there are several.
         x_label: Name and unit of the first parameter.
         y_label: Name and unit of the second parameter.
         x_scale: Factor applied to the first parameter.

@@ -22,7 +22,7 @@ def lyapunov_convergence(spectrum, ax: Axes | None = None) -> Figure:
         The figure.
 
     Raises:
-        ValueError: The spectrum has several motions.
+        ValueError: The spectrum contains the exponents of several motions.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator

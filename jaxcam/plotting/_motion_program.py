@@ -15,7 +15,7 @@ _POINTS = 200
 
 @styled
 def motion_program(program: MotionProgram, axes=None, *, unit: str = "rad") -> Figure:
-    """Draw lift, velocity, acceleration and jerk, per radian of the cam.
+    """Draw the lift and its first three derivatives with respect to the cam angle.
 
     Where a derivative jumps, its curve is broken, and the values on the two sides are
     connected by a dashed line. The infinite pulse of the next higher derivative is not

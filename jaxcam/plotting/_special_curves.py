@@ -30,9 +30,9 @@ def special_curves(
 ) -> Figure:
     """Draw curves of special points in the plane of two parameters.
 
-    Each kind of point has the same colour as on a branch. Points of codimension two on
-    the curves, and the crossings that were found with other curves, are marked and
-    named.
+    Each kind of point has the same colour as in a branch diagram. Points of codimension
+    two on the curves are marked and named, as are crossings with other curves, if these
+    were located.
 
     Args:
         curves: One or several curves from `continuation.curve`, all in the same

@@ -35,8 +35,8 @@ class Recording:
     meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """Additional information, such as the file."""
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Known constants of this recording, by the names of system fields: `{"mass":
-    0.31}`. A fit does not change them.
+    """Known constants of this recording, keyed by the names of the system's fields:
+    `{"mass": 0.31}`. A fit does not change them.
     """
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:

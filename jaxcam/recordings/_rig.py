@@ -105,7 +105,7 @@ class References:
 
     @classmethod
     def of_speed(cls, fast: float) -> "References":
-        """Return the constants for a motion whose high speeds are about `fast`.
+        """Return the constants for a motion whose highest speeds are about `fast`.
 
         Each reference speed has the same ratio to the speeds of the motion as for the
         thesis rig.

@@ -82,7 +82,7 @@ class Wandering(HybridSystem):
         return self.phase(self.base) + self.speed(self.base) * (t + self.depth * wander)
 
     def at(self, t) -> HybridSystem:
-        """Return the base near time `t`, with the drive speed at that time."""
+        """Return the base with a uniform drive that has the angle and speed at `t`."""
         angle, rate = jax.jvp(self.angle, (t,), (jnp.ones_like(t),))
         here = rate, angle - rate * t
         return eqx.tree_at(lambda s: (self.speed(s), self.phase(s)), self.base, here)

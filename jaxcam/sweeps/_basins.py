@@ -51,8 +51,8 @@ def basins(
         reruns: Number of extensions of non-periodic runs, each twice as long as the
             previous one.
         scale: Scale of the motions, shape `(n,)`; default: the largest extent or
-            coordinate of the grid, or the scale of `known`. It matters for a grid that
-            is small compared with the attractors.
+            coordinate of the grid, or the scale of `known`. The scale matters if the
+            grid is small compared with the attractors.
         known: Basins of the same system whose attractor numbers are to be kept, for
             example when zooming in.
         out: As for [`jaxcam.sweeps.blocks.run_blocks`][].
@@ -60,7 +60,8 @@ def basins(
         executor: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         workers: As for [`jaxcam.sweeps.blocks.run_blocks`][].
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][].
-        block: Number of rows along the first component of the grid computed together.
+        block: Number of rows of the grid, along the first component, that are computed
+            together.
 
     Returns:
         A [`jaxcam.sweeps.Basins`][].

@@ -57,7 +57,8 @@ def chart(
         where: Two parameters: `("speed", "stiffness")`, or two functions.
         first: Values of the first parameter, shape `(k,)`.
         second: Values of the second parameter, shape `(l,)`.
-        states: Initial states, `(n,)` or `(starts, n)`; default: in sustained contact.
+        states: Initial states, `(n,)` or `(starts, n)`; default: a state in
+            sustained contact.
         turns: As for [`jaxcam.sweeps.basins`][].
         keep: As for [`jaxcam.sweeps.basins`][].
         period_tolerance: As for [`jaxcam.sweeps.basins`][].

@@ -47,12 +47,12 @@ def diagram(
         values: Values of the parameter, shape `(points,)`.
         states: Initial states: `(n,)`; `(starts, n)` for several at each value;
             `(points, starts, n)` for different ones at each value, for example from
-            [`jaxcam.sweeps.monte_carlo`][]. Default: in sustained contact.
+            [`jaxcam.sweeps.monte_carlo`][]. Default: a state in sustained contact.
         turns: Number of periods simulated.
         keep: Number of final periods to keep.
-        direction: With "each", every value starts from the same state; with "up",
-            "down" or "both", the state is carried from one value to the next, which
-            shows hysteresis.
+        direction: With "each", the motions at all values start from the same state.
+            With "up", "down" or "both", each motion starts from the final state of the
+            motion at the previous value, so that hysteresis shows.
         dwell: Settling time and recording time (s) at each value, instead of `turns`
             and `keep`.
         period_tolerance: Tolerance for detecting periods.

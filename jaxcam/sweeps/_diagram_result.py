@@ -18,7 +18,9 @@ class Range(NamedTuple):
     high: float
     """Largest value of the parameter."""
     direction: int
-    """1 for values visited upwards, -1 downwards, 0 for independent starts."""
+    """1 for values on an upward sweep, -1 on a downward sweep, 0 for independent
+    starts.
+    """
 
 
 class Diagram:
@@ -60,8 +62,8 @@ class Diagram:
 
     @property
     def direction(self) -> np.ndarray:
-        """1 for values visited upwards, -1 downwards, otherwise 0; shape
-        `(points,)`.
+        """1 for values on an upward sweep, -1 on a downward sweep, 0 for independent
+        starts; shape `(points,)`.
         """
         return self.dataset["direction"].values
 
@@ -75,7 +77,7 @@ class Diagram:
         """Return the labels in order, each with its range of parameter values.
 
         Args:
-            start: Index of the start, if there are several.
+            start: Index of the initial state, if there are several.
 
         Returns:
             A list of `Range`.

@@ -52,12 +52,13 @@ def follow_basins(
     Args:
         system: A hybrid system, or a section that is sampled once per period.
         where: The parameter: `lambda s: s.speed`, or `"speed"`.
-        values: Values of the parameter, in the order to visit.
+        values: Values of the parameter, in the order in which basins are computed.
         grid: A [`jaxcam.sweeps.Grid`][] of initial states.
         turns: Number of periods simulated.
-        most: Distance between two orbits, in units of the scale of the motions, beyond
-            which they are not the same attractor. Pairs are chosen to minimise the sum
-            of the distances; the label may change, for example from P(1,1) to P(2,2).
+        most: Largest distance, in units of the scale of the motions, between the orbits
+            of the same attractor at two successive values. Orbits are paired so that
+            the sum of the distances is smallest; the label of an attractor may change,
+            for example from P(1,1) to P(2,2).
         out: Folder in which a sweep is stored for each value.
         progress: As for [`jaxcam.sweeps.blocks.run_blocks`][], for one value at a
             time.

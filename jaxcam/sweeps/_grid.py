@@ -57,7 +57,7 @@ class Grid(eqx.Module):
             axis: Index of the component.
 
         Returns:
-            Shape `(cells,)`.
+            Centres, shape `(cells,)`.
         """
         count = self.shape[axis]
         return self.low[axis] + self.sizes[axis] * (np.arange(count) + 0.5)
@@ -67,11 +67,11 @@ class Grid(eqx.Module):
 
         Args:
             first: Index of the first cell along the first component.
-            last: Index of the cell along the first component before which to stop;
+            last: Index after that of the last cell along the first component;
                 default: all cells.
 
         Returns:
-            Shape `(motions, n)`.
+            Centres, shape `(motions, n)`.
         """
         axes = [self.centres(i) for i in range(len(self.shape))]
         axes[0] = axes[0][first:last]

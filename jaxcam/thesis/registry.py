@@ -57,7 +57,7 @@ def reproduce(
     *,
     progress: Callable[[str, float | None], None] | None = None,
 ) -> "pd.DataFrame":
-    """Reproduce a table of the thesis, or the numbers of a figure, and compare with the
+    """Compute the numbers of a table or figure of the thesis, and compare them with the
     printed values.
 
     Args:

@@ -30,7 +30,8 @@ class BetaMap(eqx.Module):
         velocity = c (tau_P^2 / 2 + beta tau*^2),
         gap = c (tau_P^3 / 6 + beta tau*^2 tau_P + gamma tau*^3).
 
-    After complete chatter, the motion leaves from contact and beta = gamma = 0.
+    After complete chatter, the motion starts from contact at release, and both beta and
+    gamma are zero.
     """
 
     beta: Float[Array, "..."]

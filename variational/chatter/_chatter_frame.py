@@ -26,9 +26,9 @@ _SAMPLES = 256
 
 
 class ChatterFrame(eqx.Module):
-    """Release point, and scales of the chatter that ends there.
+    """The release point of a sticking orbit, and the scales of chatter close to it.
 
-    Times in the methods are those of the system; tau is the time minus `release`.
+    Arguments of the methods are times of the system; tau is the time since `release`.
     """
 
     release: Float[Array, ""]
@@ -64,7 +64,7 @@ class ChatterFrame(eqx.Module):
             speed: Rebound speed.
 
         Returns:
-            Shape `(2,)` (thesis, eq. 6.100).
+            The derivatives, shape `(2,)` (thesis, eq. 6.100).
         """
         tau = time - self.release
         first = 1 / (self.jerk * tau * tau)
@@ -79,8 +79,8 @@ class ChatterFrame(eqx.Module):
             section: Time of the section, after release (s).
 
         Returns:
-            Shape `(2,)` (thesis, eqs. 6.94-6.96); unlike in eq. 6.55, the term of order
-                tau*^3 is retained.
+            Gap and velocity, shape `(2,)` (thesis, eqs. 6.94-6.96); unlike in eq. 6.55,
+                the term of order tau*^3 is retained.
         """
         tau, after = time - self.release, section - self.release
         parts = beta_parts(self.coordinate(time, speed), self.restitution)

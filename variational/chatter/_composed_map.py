@@ -53,17 +53,19 @@ class ComposedMap(eqx.Module):
     """
 
     frame: ChatterFrame
-    """Release point between the sections at the start and the end of the period,
-    and scales of the chatter that ends there.
+    """Release point between the sections at the start and the end of the period, and
+    the scales of chatter close to it.
     """
     section: Float[Array, ""]
     """Time of the section at the end of the period (s)."""
     state: Float[Array, "2"]
-    """State, at that section, of the orbit that sticks until release, shape `(2,)`."""
+    """State, at this section, of the orbit that starts from contact at release, shape
+    `(2,)`.
+    """
     relative: Float[Array, "2"]
-    """Gap and normal velocity of that state, shape `(2,)`."""
+    """Gap and normal velocity of `state`, shape `(2,)`."""
     time: Float[Array, ""]
-    """Time of the impact D* on the orbit from release (s)."""
+    """Time of the impact D* on the orbit that starts from contact at release (s)."""
     speed: Float[Array, ""]
     """Rebound speed of D*."""
     lam: Float[Array, ""]
@@ -111,7 +113,7 @@ class ComposedMap(eqx.Module):
         """Return epsilon of the next period (thesis, eqs. 6.109 and 6.116).
 
         **Arguments:** `epsilon`, in the unit of time squared; `parameter`, the distance
-        of the parameter from the interruption; they are broadcast.
+        of the parameter from the interruption. The two are broadcast together.
         """
         return self._left(self.feedback * epsilon + self.incidence * parameter)
 
@@ -124,7 +126,7 @@ class ComposedMap(eqx.Module):
             time: Change of the time of D* (s).
 
         Returns:
-            Shape `(..., 2)`.
+            Gap and velocity, shape `(..., 2)`.
         """
         moved = self.covector[0] * speed + self.covector[1] * time
         parts = beta_parts(self.lambda_bar + moved, self.frame.restitution)
@@ -137,7 +139,7 @@ class ComposedMap(eqx.Module):
             parameter: Distance of the parameter from the interruption, any shape.
 
         Returns:
-            Shape `(..., 2)` (thesis, eqs. 6.114 and 6.115).
+            Gap and velocity, shape `(..., 2)` (thesis, eqs. 6.114 and 6.115).
         """
         return self._section(self._left(self.incidence * parameter), parameter)
 

@@ -46,10 +46,10 @@ class GrazingManifold(eqx.Module):
 def grazing_manifold(
     system: HybridSystem, n: int = 4, points: int = 200, horizon: float = 2.0
 ) -> GrazingManifold:
-    """Return the pre-images S^k and images W^k of the line of impacts of zero speed.
+    """Return the pre-images S^k and images W^k of the line of zero-speed impacts.
 
-    The line is restricted to times outside the sticking set Z, at which contact cannot
-    last: a motion that grazes there leaves the constraint again (thesis, eqs.
+    The line contains only times outside the sticking set Z. At these times, contact
+    cannot last: a motion that grazes leaves the constraint again (thesis, eqs.
     6.13-6.16).
 
     Args:
@@ -127,10 +127,12 @@ def chattering_region(
     Args:
         system: A system with two states, one constraint, a period and a positive
             coefficient of restitution.
-        points: Number of points on each piece between an impact and the previous one.
+        points: Number of points on each piece of the curve; a piece extends from an
+            impact to the previous one.
         impacts: Number of pieces.
-        near: Time before release, in periods, at which the parabola is used; its
-            relative error there is of that order, and the backward map reduces it.
+        near: Time before release, in periods, at which the parabola is used. The
+            relative error of the parabola is of this order there, and the backward map
+            reduces it.
 
     Returns:
         An [`variational.chatter.ImpactCurve`][], shape `(impacts * points,)`, ordered

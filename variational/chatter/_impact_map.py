@@ -175,7 +175,7 @@ def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
         speed: Rebound speed, >= 0.
 
     Returns:
-        Shape `(2, 2)`.
+        The derivative, shape `(2, 2)`.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

@@ -61,7 +61,9 @@ class Interruption(eqx.Module):
     converged: Bool[Array, ""]
     """Whether the bracket was reduced to rounding error."""
     ends: Float[Array, "2"]
-    """Margin at the two ends of the bracket, shape `(2,)`."""
+    """Margin at both ends of the bracket, shape `(2,)`: negative where chatter is
+    complete, positive where it is interrupted.
+    """
     slope: Float[Array, ""]
     """Derivative of the margin with respect to the parameter at `value`."""
     turns: Int[Array, ""]
@@ -71,12 +73,12 @@ class Interruption(eqx.Module):
 def interruption_in(
     system: HybridSystem, where: Where, low, high, periods: int = 1
 ) -> Interruption:
-    """Find the interruption between two values of a parameter; for use inside `jit`.
+    """Find the interruption of chatter between two values of a parameter.
 
-    Safeguarded Newton's method is applied to the margin. The value can be
-    differentiated in forward mode with respect to every other parameter of the system
-    (implicit function theorem). No error is raised; `converged` is false if the margin
-    does not change sign.
+    This function is for use inside `jit`. A safeguarded Newton's method finds the zero
+    of the margin. The result can be differentiated in forward mode with respect to
+    every other parameter of the system (implicit function theorem). No error is raised;
+    `converged` is false if the margin does not change sign.
 
     Args:
         system: A system with two states, one constraint and a period.
@@ -202,8 +204,8 @@ def chatter_interruption(
         where: Selects the parameter: `lambda system: system.speed`, or `"speed"`.
         bracket: Two values of the parameter, with complete chatter at one and
             interrupted chatter at the other. With several periods, both should be close
-            to the interruption, because elsewhere contact may occur earlier, which also
-            counts as interrupted.
+            to the interruption: elsewhere, contact may occur in an earlier period, and
+            the chatter then also counts as interrupted.
         periods: Number of forcing periods in one period of the orbit.
 
     Returns:

@@ -78,12 +78,13 @@ class LocalMap(eqx.Module):
 
 
 def fit_local_map(lobes: Lobes) -> LocalMap:
-    """Fit the scales by lines through the logarithms, and fit one lobe (thesis, eqs.
-    5.2-5.5).
+    """Fit the local map of the thesis, eqs. 5.2-5.5, to sampled lobes.
 
-    The cubic with a square root (thesis, eq. 5.3) passes through both ends of the first
-    lobe and matches the sampled slope at its points of slope 1, 0 and -1; a slope that
-    the lobe does not reach is replaced by the nearest one.
+    The scales follow from straight lines through the logarithms of the widths and
+    heights of the lobes, and the shape from the first lobe. The cubic with a square
+    root (thesis, eq. 5.3) passes through both ends of the first lobe and matches the
+    sampled slope at its points of slope 1, 0 and -1; a slope that the lobe does not
+    reach is replaced by the nearest one.
 
     Args:
         lobes: The sampled lobes.

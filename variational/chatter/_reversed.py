@@ -42,7 +42,7 @@ class Reversed(HybridSystem):
         return Reversed(self.forward.prepared())
 
     def check(self) -> None:
-        """Raise `ValueError` if a parameter of `forward` has no physical meaning."""
+        """Raise `ValueError` if a parameter of `forward` has an unphysical value."""
         self.forward.check()
 
     def vector_field(self, t, state) -> jax.Array:

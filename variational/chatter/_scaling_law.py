@@ -15,10 +15,12 @@ class ScalingLaw(eqx.Module):
     """Fixed point: impacts with this lambda accumulate exactly at release (thesis,
     eq. 6.45)."""
     p: Float[Array, "..."]
-    """h(lambda_bar), the factor by which each impact is closer to release."""
+    """h(lambda_bar), the ratio (less than 1) of the times from successive impacts to
+    release.
+    """
     q: Float[Array, "..."]
-    """1 / f'(lambda_bar), the factor by which each lobe is closer to lambda_bar
-    (thesis, eq. 6.49).
+    """1 / f'(lambda_bar), the ratio (less than 1) of the distances of successive lobes
+    from lambda_bar (thesis, eq. 6.49).
     """
     kappa: Float[Array, "..."]
     """Exponent of the envelope |beta| <= |lambda - lambda_bar|^kappa (thesis,

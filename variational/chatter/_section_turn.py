@@ -116,12 +116,13 @@ def to_section(
 
 
 def section_turn(system: HybridSystem, state, phase=0.0) -> SectionArrival:
-    """Apply the stroboscopic map through chatter, from the state at a phase to the
-    state one period later.
+    """Return the state one period after a given state in flight, with all impacts of
+    any chatter in between.
 
-    The map (thesis, eq. 5.1) is accurate to rounding error for impacts of any number
-    and speed, unlike a simulation that completes chatter near its interruption. The
-    function is pure: it can be compiled, batched and differentiated in forward mode.
+    This stroboscopic map (thesis, eq. 5.1) is accurate to rounding error for impacts of
+    any number and speed, unlike a simulation that completes chatter analytically close
+    to its interruption. The function is pure: it can be compiled, batched and
+    differentiated in forward mode.
 
     Args:
         system: A system with two states, one constraint and a period.

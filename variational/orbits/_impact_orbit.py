@@ -25,7 +25,7 @@ class ImpactOrbit(eqx.Module):
     states: Float[Array, "k n"]
     """State just after each impact, shape `(k, n)`."""
     constraints: tuple[int, ...] | None = eqx.field(static=True, default=None)
-    """Constraint hit by each impact; default: the first."""
+    """Constraint hit at each impact; default: the first."""
     periods: int = eqx.field(static=True, default=1)
     """Number of forcing periods after which the orbit repeats."""
     steps: int = eqx.field(static=True, default=32)
@@ -49,7 +49,7 @@ class ImpactOrbit(eqx.Module):
             system: The system.
 
         Returns:
-            Shape `(u,)`.
+            Unknowns, shape `(u,)`.
         """
         phases = self.times / system.period
         return jnp.concatenate([phases[:, None], self.states], axis=1).ravel()

@@ -19,7 +19,7 @@ class Shooting(AbstractShooting):
     """
 
     constraints: tuple[int, ...] = eqx.field(static=True)
-    """Constraint hit by each impact, in order."""
+    """Constraint hit at each impact, in order."""
     periods: int = eqx.field(static=True)
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: int = eqx.field(static=True)
@@ -49,7 +49,7 @@ class Shooting(AbstractShooting):
 
     @property
     def hits(self) -> AnyArray:
-        """Constraint hit by each impact, shape `(m,)`."""
+        """Constraint hit at each impact, shape `(m,)`."""
         return np.array(self.constraints, int)
 
     def padded(self, rows: int, most_periods: int) -> "PaddedShooting":
@@ -58,7 +58,7 @@ class Shooting(AbstractShooting):
         Args:
             rows: Number of rows, at least the number of impacts, which must not be
                 zero.
-            most_periods: Upper bound of the number of periods.
+            most_periods: Upper bound on the number of periods.
 
         Returns:
             A [`variational.orbits.PaddedShooting`][].
@@ -78,7 +78,7 @@ class PaddedShooting(AbstractShooting):
     """
 
     constraints: AnyArray
-    """Constraint hit by each impact, then zeros, shape `(rows,)`."""
+    """Constraint hit at each impact, then zeros, shape `(rows,)`."""
     periods: AnyArray
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: int = eqx.field(static=True)
@@ -88,7 +88,7 @@ class PaddedShooting(AbstractShooting):
     impacts: AnyArray
     """Number of impacts."""
     capacity: int = eqx.field(static=True)
-    """Upper bound of the number of periods; 0 without forcing."""
+    """Upper bound on the number of periods; 0 without forcing."""
 
     @property
     def forced(self) -> bool:
@@ -97,7 +97,7 @@ class PaddedShooting(AbstractShooting):
 
     @property
     def most_periods(self) -> int:
-        """Upper bound of the number of periods."""
+        """Upper bound on the number of periods."""
         return self.capacity
 
     @property
@@ -112,5 +112,5 @@ class PaddedShooting(AbstractShooting):
 
     @property
     def hits(self) -> AnyArray:
-        """Constraint hit by each impact, then zeros, shape `(rows,)`."""
+        """Constraint hit at each impact, then zeros, shape `(rows,)`."""
         return self.constraints

@@ -57,7 +57,7 @@ class AbstractShooting(eqx.Module):
     """
 
     constraints: eqx.AbstractVar[Any]
-    """Constraint hit by each impact, in order."""
+    """Constraint hit at each impact, in order."""
     periods: eqx.AbstractVar[Any]
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     dimension: eqx.AbstractVar[int]
@@ -78,7 +78,7 @@ class AbstractShooting(eqx.Module):
     @property
     @abc.abstractmethod
     def most_periods(self) -> int:
-        """Upper bound of `periods` (static)."""
+        """Upper bound on `periods` (static)."""
 
     @property
     @abc.abstractmethod
@@ -88,7 +88,7 @@ class AbstractShooting(eqx.Module):
     @property
     @abc.abstractmethod
     def hits(self) -> AnyArray:
-        """Constraint hit by each impact, shape `(rows,)`."""
+        """Constraint hit at each impact, shape `(rows,)`."""
 
     @property
     def turns(self) -> Float[Array, ""]:

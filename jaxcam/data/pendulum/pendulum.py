@@ -1,4 +1,4 @@
-"""A rigid textbook pendulum without friction."""
+"""Textbook model of a rigid pendulum without friction."""
 
 import jax.numpy as jnp
 

@@ -30,8 +30,8 @@ def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
 def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     """Return all alternatives to the chosen explanation, ranked by BIC.
 
-    These are fitted subsets, each term in addition to the chosen ones, and single terms
-    whose predicted gain was too small for a fit.
+    These are fitted subsets, each term in addition to the chosen ones, and terms on
+    their own whose predicted gain was too small for a fit.
     """
     best = choice.best
     found = [

@@ -42,7 +42,7 @@ class Alternative(NamedTuple):
     """Another subset of terms, or other functions, with its difference in BIC.
 
     `name` joins the names of its `terms`, or is `"none"`, or gives functions by a
-    formula or by their arguments; `reason` states why it was not named.
+    formula or by their arguments; `reason` states why this alternative was not chosen.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Effect:
     sentence: str
     """The effect in words."""
     parameters: dict[str, Value]
-    """Its strengths."""
+    """Strengths of the effect."""
     where: str
     """`"flight"`, `"impact"`, `"contact"`, `"drive"` or `"sensor"`."""
     region: str
@@ -72,14 +72,14 @@ class Effect:
     records: tuple[str, ...]
     """Recordings in which it is significant."""
     delta_bic: float
-    """BIC with it minus BIC without it."""
+    """BIC with the effect minus BIC without it."""
     heldout_gain_nats: float
     """Gain in the log-likelihood of held-out data."""
     inclusion: float | None
     """Share of the bootstrap samples in which it would be named; `None` for an unknown
     effect without a function."""
     term: bool = True
-    """Whether it is a named term; otherwise it is unknown."""
+    """Whether the effect is a named term; otherwise it is unknown."""
     share: float | None = None
     """Share of the misfit that it explains; for an unknown effect, the unexplained
     share. `None` for the drive, which is diagnosed from its own channel.
@@ -120,8 +120,8 @@ class Diagnosis:
     alternatives: tuple[Alternative, ...]
     """Other subsets of terms, the best first."""
     heldout_before: float
-    """Rms of the held-out residuals of the textbook model (in `unit`), predicted one
-    flight ahead.
+    """Rms of the held-out residuals of the textbook model, for predictions one flight
+    ahead (in `unit`).
     """
     heldout_after: float
     """Rms of the held-out residuals with the effects (in `unit`)."""
@@ -159,8 +159,8 @@ class Diagnosis:
     policy: Policy = Policy()
     """The settings of the diagnosis."""
     missing: tuple[MissingFunction, ...] = ()
-    """Unnamed effects, as functions fitted together with the rig parameters; `after`
-    is the model with them.
+    """Unnamed effects (outside the library), as functions fitted together with the rig
+    parameters; these functions are part of the model of `after`.
     """
     misfit: dict[str, float] = dataclasses.field(default_factory=dict)
     """Shares of the misfit of the textbook model in `"flight"`, at an `"impact"` and in
@@ -224,7 +224,8 @@ class Diagnosis:
 
         The drive turns at the speed of the given recording. Sensor errors are not
         included. A force with an internal state is included with that state: the system
-        is then a `WithHidden`, whose additional components do not change at impacts.
+        is then a `WithHidden`, whose additional state components do not change at
+        impacts.
         """
         model = self.model(record)
         system = model.system

@@ -94,7 +94,8 @@ def _fitted(
 ) -> Missing | None:
     """Fit a form in place of a function, starting from given parameters.
 
-    **Returns:** the fit, or `None` if the form does not even explain single pieces.
+    **Returns:** the fit, or `None` if the form does not even explain individual
+    pieces.
     """
     problem = found.problem
     size = Roughness(size=abs(float(numbers[0])))

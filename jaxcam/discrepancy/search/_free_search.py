@@ -1,7 +1,7 @@
 """Search for unnamed functions in addition to named terms, by their evidence.
 
-The search first uses single pieces of flight, which do not depend on impacts and other
-flights, and then whole recordings.
+The search first uses individual pieces of flight, which do not depend on impacts and
+other flights, and then whole recordings.
 """
 
 import dataclasses
@@ -144,7 +144,7 @@ class FreeSearch:
     def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
         """Return the fit with another function alone, or `None` if it fails.
 
-        On single pieces of flight a smooth function may be ahead of the right one.
+        On individual pieces of flight, a smooth function may be ahead of the right one.
         """
         self.progress(f"fitting {lead.label} instead", None)
         return self._with(self.problem, bare, lead)
@@ -181,7 +181,7 @@ class FreeSearch:
         problem = self.apart if apart else self.problem
         while len(found.functions) + len(found.names) < self.policy.most_terms:
             if apart and heat_of(found.fit) < self.policy.as_noise:
-                # single pieces contain little information on small effects
+                # individual pieces contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
             if self.first is None:

@@ -156,7 +156,7 @@ class Trials:
         astray = not self._sound(start.fit)
         first, second = (nominal, ended) if astray else (ended, nominal)
         grown = names > start.names
-        # single terms decide which pairs are tried, so they get more iterations
+        # individual terms decide which pairs are tried, so they get more iterations
         beaten = start.fit.cost if grown and len(names) > 1 else math.inf
         # the loss without a term must be accurate if it decides whether to keep it
         decides = -math.inf

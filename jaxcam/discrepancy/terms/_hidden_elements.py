@@ -78,7 +78,7 @@ class HiddenElement(eqx.Module):
 
 
 class Resonator(HiddenElement):
-    """A resonance driven by the position, `z'' + 2 D w z' + w^2 z = q`.
+    """A resonator driven by the position, `z'' + 2 D w z' + w^2 z = q`.
 
     The force is `by_state * z + by_rate * z'`, with `w = 2 pi frequency` and the
     damping ratio D.
@@ -173,8 +173,8 @@ class Hysteresis(HiddenElement):
     """Names of the components of the internal state."""
 
     limit: FloatScalar = _field(1.0)
-    """Scale of the internal state, in the unit of the coordinate; its largest value if
-    `loading` is 1.
+    """Scale of the internal state, in the unit of the coordinate; this is the largest
+    value of the state if `loading` is 1.
     """
     beta: FloatScalar = _field(0.5)
     """Part b that changes its sign at a reversal. Energy is dissipated if `b * loading`

@@ -67,7 +67,7 @@ class CoulombFriction(Term):
     """
 
     name: ClassVar[str] = "coulomb_friction"
-    sentence: ClassVar[str] = "Coulomb friction, a constant force against the motion"
+    sentence: ClassVar[str] = "Coulomb friction, a constant force opposing the motion"
     region: ClassVar[str] = "in flight, changing sign with the velocity"
     source: ClassVar[str] = (
         "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 1994"
@@ -296,7 +296,7 @@ def library(
     Args:
         turned: Whether the system has a drive; without one, there are no profile
             errors.
-        references: Constants in the terms, which belong to a rig (`rig.references`),
+        references: Constants of a rig that occur in the terms (`rig.references`),
             such as the centre of a nonlinear spring or the reference speed of a
             restitution law.
         clocked: Whether times are known absolutely, from a drive (the default) or a

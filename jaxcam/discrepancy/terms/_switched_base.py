@@ -92,7 +92,7 @@ class SwitchedWithHidden(WithHidden, _Around):
 def system_with_terms(
     base: HybridSystem, terms: Sequence[Term], coordinates=((0, 1),)
 ) -> WithTerms:
-    """Return a system and terms added to it, with its switching surfaces if it has any.
+    """Return a system with terms added to it; any switching surfaces are kept.
 
     Args:
         base: The system.
@@ -116,7 +116,7 @@ def system_with_terms(
 def system_with_element(
     base: HybridSystem, element: HiddenElement, coordinate: tuple[int, int]
 ) -> WithHidden:
-    """Return a system with an element, with its switching surfaces if it has any.
+    """Return a system with an element added to it; any switching surfaces are kept.
 
     Args:
         base: The system.

@@ -74,9 +74,9 @@ def strength(
         lower: Lower bound, for example for a sign required by physics.
         upper: Upper bound.
         default: Value of a new term.
-        inner: Whether it has no effect while the strengths are zero, like an edge or a
-            frequency. The fit starts from the best of the values that the term's
-            method `starts` returns; if it returns none, the parameter must be a
+        inner: Whether the field has no effect while the strengths are zero, like an
+            edge or a frequency. The fit starts from the best of the values that the
+            term's method `starts` returns; if it returns none, the parameter must be a
             frequency (Hz), which a scan finds.
 
     Returns:
@@ -111,13 +111,13 @@ class Strength:
     unit: str
     """Unit."""
     size: float
-    """A significant change."""
+    """Size of a significant change."""
     lower: float = -math.inf
     """Lower bound."""
     upper: float = math.inf
     """Upper bound."""
     inner: bool = False
-    """Whether it has no effect while the strengths are zero."""
+    """Whether the parameter has no effect while the strengths are zero."""
 
 
 class Term(eqx.Module):
@@ -153,11 +153,11 @@ class Term(eqx.Module):
     region: ClassVar[str] = "everywhere"
     """Part of the motion, in words."""
     source: ClassVar[str] = ""
-    """Literature."""
+    """Literature reference."""
     listed: ClassVar[bool] = True
     """False for a term that only describes an unknown effect and is never a verdict."""
     corner: ClassVar[bool] = False
-    """Whether its force jumps, like dry friction, and is smoothed."""
+    """Whether the force jumps, like dry friction, and is therefore smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
     """Parts of the model in which it acts."""
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
@@ -239,7 +239,7 @@ class Term(eqx.Module):
         return tuple(found)
 
     def numbers(self) -> tuple[Any, ...]:
-        """Return the values of the strengths, in the same order."""
+        """Return the values of the strengths, in the order of the fields."""
         return tuple(getattr(self, one.name) for one in self.strengths())
 
     def written(self, unit: str) -> str:

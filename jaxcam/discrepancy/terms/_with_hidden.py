@@ -11,8 +11,8 @@ from ._hidden_elements import HiddenElement
 class WithHidden(HybridSystem):
     """A system with an element that is driven by a coordinate and exerts a force on it.
 
-    The state is that of the base followed by that of the element, which does not change
-    at impacts.
+    The state is that of the base followed by that of the element; the state of the
+    element does not change at impacts.
     """
 
     base: HybridSystem

@@ -11,7 +11,7 @@ from ._where import Where
 
 
 class WithTerms(HybridSystem):
-    """A system and terms added to it.
+    """A system with terms added to it.
 
     The `contact` of a term is subtracted from the gap of its `constraint`, and its
     `restitution` multiplies the coefficient of restitution there.

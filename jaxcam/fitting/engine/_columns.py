@@ -116,15 +116,15 @@ def invert_information(
 ) -> Float[np.ndarray, "g g"]:
     """Return the inverse of a positive semidefinite information matrix.
 
-    The matrix is scaled to a unit diagonal and inverted through its eigenvalues, each
-    of which is at least as large as their rounding error. An undetermined value (a zero
-    on the diagonal) has an infinite variance.
+    The matrix is scaled to a unit diagonal and inverted through its eigenvalues; any
+    eigenvalue below the rounding error is replaced by the rounding error. An
+    undetermined value (a zero on the diagonal) has an infinite variance.
 
     Args:
         information: The matrix, shape `(g, g)`.
 
     Returns:
-        Shape `(g, g)`.
+        The inverse, shape `(g, g)`.
 
     Raises:
         ValueError: The matrix is not finite, for example because the model yields NaN.
@@ -158,7 +158,7 @@ def off_nominal(problem: Problem, columns: Columns, point: Point):
         point: The values.
 
     Returns:
-        Shape `(g,)`.
+        Distances, shape `(g,)`.
     """
     values = np.asarray(point.values)
     now = values[np.maximum(columns.record, 0), columns.parameter]
@@ -174,7 +174,7 @@ def _nominal(problem: Problem, place: int | np.integer) -> float:
 
 
 def prior_information(problem: Problem, columns: Columns, prior: bool):
-    """Return the information of the tolerances, `(scale / stderr)^2`.
+    """Return the information that the tolerances contain, `(scale / stderr)^2`.
 
     It is zero with `prior=False`, and for a parameter without prior knowledge.
 
@@ -184,7 +184,7 @@ def prior_information(problem: Problem, columns: Columns, prior: bool):
         prior: Whether the tolerances count.
 
     Returns:
-        Shape `(g,)`.
+        Information of each free value, shape `(g,)`.
     """
     stderr = np.array([problem.parameters[p].prior_stderr for p in columns.parameter])
     return (columns.scale / stderr) ** 2 if prior else np.zeros(len(columns.scale))

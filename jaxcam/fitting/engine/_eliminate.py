@@ -34,8 +34,8 @@ class Reduced(NamedTuple):
     score: Float[Array, "r m"]
     """Score of the parameters of each recording, shape `(r, m)`."""
     gain: Float[Array, "r k n c"]
-    """Expresses each state in terms of the parameters, a constant and the next state,
-    shape `(r, k, n, m + 1 + n)`.
+    """Coefficients that express each state by the parameters, a constant and the next
+    state, shape `(r, k, n, m + 1 + n)`.
     """
 
 
@@ -62,7 +62,7 @@ def state_steps(reduced: Reduced, change: Float[Array, "r m"]) -> Float[Array, "
         change: Step of the parameters, shape `(r, m)`.
 
     Returns:
-        Shape `(r, k, n)`, in the scales of the states.
+        Steps, shape `(r, k, n)`, in the scales of the states.
     """
 
     def record(gain, change):

@@ -146,7 +146,7 @@ class Turning(eqx.Module):
 
 
 class Input(eqx.Module):
-    """A measured input, such as a force or a voltage, with the system field for it.
+    """A measured input, such as a force or a voltage, and the system field for it.
 
     When a recording is predicted, the field follows the input in that recording. Each
     sample is held until the next (zero-order hold), as in digital controllers. Within

@@ -1,4 +1,4 @@
-"""Fit the states of single pieces by least squares, from several starts."""
+"""Fit the states of individual pieces by least squares, from several starts."""
 
 from collections.abc import Sequence
 

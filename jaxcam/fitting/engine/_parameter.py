@@ -27,13 +27,13 @@ class Parameter:
     tolerance: float = math.inf
     """Largest deviation from `nominal`, as stated by the manufacturer: any value within
     it is equally likely. The fit uses a Gaussian of the same standard deviation,
-    `tolerance / sqrt(3)`. It is infinite without prior knowledge.
+    `tolerance / sqrt(3)`. The tolerance is infinite without prior knowledge.
     """
     nominal: float | None = None
     """Nominal value; default: that of the model."""
     scale: float | None = None
     """Size of a relevant change; by default the tolerance, or a hundredth of the value
-    if there is none. It does not influence the result.
+    if there is none. The scale does not influence the result.
     """
     lower: float = -math.inf
     """Lower bound."""

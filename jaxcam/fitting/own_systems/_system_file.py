@@ -32,7 +32,7 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
         The class.
 
     Raises:
-        RigError: The class cannot be loaded; the message names the file and the fix.
+        RigError: The class cannot be loaded; the message gives the file and the remedy.
     """
     path, name = split_name(named)
     file = Path(folder) / path
@@ -60,14 +60,14 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
 
 
 def system_source(cls: type[HybridSystem]) -> str | None:
-    """Return `FILE.py:CLASS` for a class from such a file, or `None` for any other
-    class.
+    """Return `FILE.py:CLASS` for a class loaded by `system_class`, or `None` for any
+    other class.
 
     Args:
         cls: The class.
 
     Returns:
-        Text, or `None`.
+        File and class as text, or `None`.
     """
     for file, (_, module) in _loaded.items():
         if getattr(module, cls.__name__, None) is cls:

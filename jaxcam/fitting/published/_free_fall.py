@@ -49,7 +49,7 @@ def fit_free_fall(
         times: Times (s), increasing, before the first impact, shape `(k,)`.
         measured: One component of the state at these times, shape `(k,)`.
         error: Standard error of a sample, in the unit of the component.
-        state: Initial guess of the state at `times[0]`, shape `(n,)`.
+        state: Initial guess for the state at `times[0]`, shape `(n,)`.
         observe: Index of the measured component.
         name: Name of the parameter for the report.
         steps: Number of eighth-order Runge-Kutta steps between two samples.

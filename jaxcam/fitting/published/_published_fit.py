@@ -155,11 +155,11 @@ class PublishedFit:
         )
 
     def weak(self, share: float = 0.5) -> list[str]:
-        """Describe the combinations of parameters that the data determine poorly.
+        """Return a sentence on each poorly determined combination of parameters.
 
         These are the combinations for which the data provide less than the fraction
-        `share` of the information; the priors provide the rest. Each is described in
-        one sentence, the weakest first.
+        `share` of the information; the priors provide the rest. The weakest
+        combination is described first.
         """
         sentences = []
         for part, direction in zip(self.shares, self.directions, strict=True):

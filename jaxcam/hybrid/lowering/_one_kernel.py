@@ -16,7 +16,7 @@ def one_kernel(function: Callable, batch: bool = False, on: bool = True) -> Call
     """Wrap `function` of one pytree as a call that the CPU backend does not split.
 
     With `batch`, the calls inside are inlined, which is better for wide vectors and
-    worse for single trajectories and their derivatives. A function that the backend
+    worse for individual trajectories and their derivatives. A function that the backend
     cannot compile as one kernel, because it needs a library, is compiled as usual;
     without `on`, every function is.
     """

@@ -22,7 +22,8 @@ class LawPiece(NamedTuple):
 class MotionLaw(NamedTuple):
     """A normalised rise from 0 to 1 as the fraction u of the segment goes from 0 to 1.
 
-    Define a law of your own from such pieces; the last piece must end at 1.
+    Define a law of your own as a sequence of [`jaxcam.models.cams.LawPiece`][]; the
+    last piece must end at 1.
     """
 
     name: str

@@ -122,7 +122,7 @@ class MotionProgram(CamProfile):
         At a joint, these are the values just after it.
 
         Returns:
-            Shape `(..., 4)`.
+            The values s, v, a and j, shape `(..., 4)`.
         """
         pieces = self.prepared()
         return pieces.jet(pieces.local(cam_angle)[0], cam_angle)

@@ -38,7 +38,7 @@ def compare(
         observe: The channels to compare, each with the index of the state component
             that it measures, as in `{"height_m": 0}`, or with a function of the state.
             By default, the segmented channel measures the first component.
-        noise: Standard deviations of the channels; by default measured from the
+        noise: Standard deviations of the channels; by default estimated from the
             recording.
         clock: Time of the model at each sample (s); by default that of the segments,
             or, for a `CamFollower`, the time at which its cam has the measured angle.

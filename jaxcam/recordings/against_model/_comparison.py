@@ -17,7 +17,7 @@ class Residuals:
     record: str
     """Name of the recording."""
     mode: str
-    """`"flight"`, `"contact"`, `"impact place"` or `"impact speed"`."""
+    """`"flight"`, `"contact"`, `"impact position"` or `"impact speed"`."""
     channel: str
     """The channel."""
     unit: str
@@ -201,7 +201,7 @@ def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
 _PLACES = {
     "flight": "In flight, {channel} differs from the model by {ratio} times the noise",
     "contact": "In contact, it differs from the surface by {ratio} times the noise",
-    "impact place": "At impacts, the position differs from the surface by {ratio} "
+    "impact position": "At impacts, the position differs from the surface by {ratio} "
     "times its standard error",
     "impact speed": "The speeds after impacts differ from the impact law by {ratio} "
     "times their standard error",

@@ -139,7 +139,7 @@ def at_impacts(system, segments, pick, clock) -> list[Residuals]:
     return [
         Residuals(
             *head,
-            "impact place",
+            "impact position",
             segments.channel,
             unit,
             moment,

@@ -95,18 +95,18 @@ def segment(
     Args:
         recording: The recording.
         channel: The channel of the motion.
-        contact: Value of the channel in contact at each sample, shape `(k,)` or one
-            number; the motion is above it. If both this and `upper` are `None`, the
-            entire recording is one flight.
+        contact: Position of the lower surface at each sample, in the units of the
+            channel, shape `(k,)` or one number. If both `contact` and `upper` are
+            `None`, the entire recording is one flight.
         contact_rate: Rate of change of `contact`; by default computed from its
             differences.
-        upper: Value of the channel at a second surface, above the motion, such as the
-            upper one of two stops.
+        upper: Position of a second surface, above the motion, such as the upper of two
+            stops.
         upper_rate: Rate of change of `upper`.
         tolerance: Largest error of the stated position of each surface, in the units of
             the channel; each surface is shifted by at most this amount to match the
             impacts.
-        noise: Standard deviation of a sample; by default measured from the recording.
+        noise: Standard deviation of a sample; by default estimated from the recording.
         restitution: Expected coefficient of restitution, for impacts too weak to be
             observed.
 

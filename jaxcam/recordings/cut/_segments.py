@@ -49,9 +49,10 @@ class Flight:
 
 @dataclasses.dataclass(frozen=True)
 class Contact:
-    """An interval within the noise of the surface; samples `first <= i < last`.
+    """An interval during which the distance from the surface is within the noise.
 
-    It begins with impacts that are too weak to be observed.
+    It consists of the samples `first <= i < last`, and it begins with impacts that are
+    too weak to be observed.
     """
 
     start: Boundary
@@ -99,11 +100,11 @@ class Impacts:
     separation: Float[np.ndarray, " k"]
     """Speed relative to the surface after the impact, positive."""
     surface_stderr: Float[np.ndarray, " k"]
-    """Standard error of the surface speed, common to both."""
+    """Standard error of the surface speed, common to `approach` and `separation`."""
     flight: Int[np.ndarray, " k"]
-    """Index of the flight that ends here; the next one begins here."""
+    """Index of the flight that ends at the impact; the next flight begins there."""
     side: Int[np.ndarray, " k"]
-    """Surface hit by the motion: 0 below it, 1 above it."""
+    """Surface that was hit: 0 for the lower one, 1 for the upper one."""
 
     @property
     def count(self) -> int:
@@ -169,8 +170,8 @@ class Segments:
     surface: Surface | None = None
     """Surface of a cam-follower's cam, from which the gap was computed."""
     sure: Bool[np.ndarray, " k"] | None = None
-    """Whether a hidden flight can be excluded at each sample, shape `(k,)`; `None` for
-    all samples.
+    """For each sample, whether a flight too low to be observed can be excluded, shape
+    `(k,)`; `None` if it can be excluded for all samples.
     """
 
     def resting(self, contact: Contact) -> Bool[np.ndarray, " k"]:

@@ -35,8 +35,9 @@ def read_recordings(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> tuple[Recording, ...]:
-    """Read every recording in one file: text (plain or gz), .mat, .xlsx or .parquet.
+    """Read every recording in one file.
 
+    The file is text (plain or gzip-compressed), `.mat`, `.xlsx` or `.parquet`.
     Column names end with the unit. Columns in `_deg`, `_rpm`, `_ms`, `_mm` and similar
     units are converted and renamed (`cam_angle_deg` -> `cam_angle_rad`), as are columns
     with the unit in brackets (`Time (ms)` -> `time_s`). One column is the time.
@@ -44,7 +45,7 @@ def read_recordings(
     Args:
         file: The file; a name such as `..._150.7rpm.csv` gives the nominal speed.
         channels: Required columns (SI names).
-        split: Column that numbers the recordings in a file with several of them.
+        split: Column with the recording number, for a file with several recordings.
         gaps: `"refuse"` raises an error for a recording with missing samples, `"split"`
             cuts it into pieces, and `"mend"` repairs it: it bridges short gaps, splits
             at long gaps and corrects slips of an encoder (see `mend`). The repairs are
@@ -53,7 +54,8 @@ def read_recordings(
             with `"-"` to skip one. For columns that have other names in the file, a
             mapping from those names to channels, optionally with a factor: `{"Angle":
             "angle_deg", "Y1": ("height_m", -8e-4)}`; then only named or required
-            columns are read, and rows with an empty cell in them are omitted.
+            columns are read, and rows with an empty cell in one of these columns are
+            omitted.
         rate: Sampling rate of a file without a time column (Hz).
 
     Returns:
@@ -140,20 +142,21 @@ def read_case(
 ) -> Case:
     """Read all recordings in a folder, ordered by name.
 
-    Files are text (CSV of any kind, `.tsv`, `.lvm`, each plain or gz), `.mat`, `.xlsx`
-    or `.parquet`; if there are none of these, `.txt`, `.dat` and `.xls` are read.
+    Files are text (CSV of any kind, `.tsv`, `.lvm`; plain or gzip-compressed), `.mat`,
+    `.xlsx` or `.parquet`; if there are none of these, `.txt`, `.dat` and `.xls` are
+    read.
 
     Args:
         folder: The folder.
         channels: Required columns (SI names); `()` for rigs other than a cam-follower.
-        split: Column that numbers the recordings in a file with several of them.
+        split: Column with the recording number, for a file with several recordings.
         gaps: Handling of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).
         columns: For files without a header line, the names of the columns in order,
             with `"-"` to skip one. For columns that have other names in the files, a
             mapping from those names to channels, optionally with a factor: `{"Angle":
             "angle_deg", "Y1": ("height_m", -8e-4)}`; then rows with an empty cell in
-            these columns are omitted.
+            one of these columns are omitted.
         rate: Sampling rate of files without a time column (Hz).
 
     Returns:

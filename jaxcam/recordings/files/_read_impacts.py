@@ -45,7 +45,8 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
         An [`jaxcam.recordings.ImpactTable`][].
 
     Raises:
-        RecordingError: The file cannot be used; the message names the row and the fix.
+        RecordingError: The file cannot be used; the message gives the row and the
+            remedy.
 
     Examples:
         >>> from pathlib import Path

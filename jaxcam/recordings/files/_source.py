@@ -54,7 +54,7 @@ class Source:
     def numbers(self, name: str, missing: bool = False) -> Float[np.ndarray, " k"]:
         """Return a column as numbers; with `missing`, an empty cell becomes NaN.
 
-        **Raises:** `RecordingError` that names the row and the fix.
+        **Raises:** `RecordingError` that gives the row and the remedy.
         """
         column = self.columns[name]
         text = column.dtype.kind not in "fiub"

@@ -23,7 +23,7 @@ LEFT_OUT = "-"
 
 
 def read_table(file: Path, names: Sequence[str] | None = None) -> Source:
-    """Return the columns of a text table, plain or gz, in the order of the file.
+    """Return the columns of a text table, plain or gzipped, in the order of the file.
 
     Cells are separated by tabs, semicolons, commas or spaces; numbers have a decimal
     point or comma. Names are in the line above the numbers, and units in the names or

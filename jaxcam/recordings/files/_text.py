@@ -27,7 +27,7 @@ class Lines(NamedTuple):
 
 
 def read_lines(file: Path) -> Lines:
-    """Return the lines of a text file, plain or gz, up to the end of its first table.
+    """Return the lines of a text file (plain or gzipped) to the end of its first table.
 
     **Raises:** `RecordingError` for a file that is missing, empty, truncated or not
     text.

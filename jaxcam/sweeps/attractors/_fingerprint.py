@@ -32,7 +32,8 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
         scale: Scale of the states, shape `(n,)`.
 
     Returns:
-        Shape `(motions, fingerprint_size(n))`; NaN for motions without an orbit.
+        Fingerprints, shape `(motions, fingerprint_size(n))`; NaN for motions without an
+            orbit.
     """
     z = (np.asarray(states) - origin) / scale
     lanes, keep, n = z.shape

@@ -52,7 +52,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
             value.
 
     Returns:
-        Shape `(motions,)`.
+        Periods, shape `(motions,)`.
     """
     states = np.asarray(states, dtype=float)
     lanes, keep, _ = states.shape

@@ -19,7 +19,7 @@ from ._system_section import AbstractSystemSection
 class PoincareSection(AbstractSystemSection):
     """Poincaré section: crossings of `function(t, state) = 0`, with their times.
 
-    A jump of the state across the section, by an impact, is not a crossing, nor is the
+    A jump of the state across the section at an impact is not a crossing, nor is the
     end of a contact that held the motion on the section. For points at a constraint,
     use [`jaxcam.sweeps.ImpactSection`][].
 

@@ -57,7 +57,7 @@ class AbstractSection(eqx.Module):
         """Return the default initial state of each motion.
 
         Returns:
-            Shape `(motions, n)`.
+            States, shape `(motions, n)`.
 
         Raises:
             ValueError: The system has no default start.
@@ -85,7 +85,7 @@ class AbstractSection(eqx.Module):
         samples.
 
         Returns:
-            Shape `(motions, n)`.
+            Scales, shape `(motions, n)`.
         """
         del where, values
         seen = np.where(np.isfinite(samples.states), np.abs(samples.states), 0.0)
