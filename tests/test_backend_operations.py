@@ -369,3 +369,36 @@ def test_a_function_that_prints_is_left_to_xla():
 
     with pytest.raises(Lacking, match="debug"):
         Mapped(printing, 0, 1)
+
+
+_TABLE = np.array([[1.5, -2.0, np.nan], [0.0, -0.0, np.inf]])
+_KNOWN = {
+    "abs": lax.abs,
+    "not": lambda x: lax.bitwise_not(lax.gt(x, np.zeros((2, 3)))),
+    "select": lambda x: lax.select_n(lax.gt(x, np.zeros((2, 3))), x, 2 * x),
+    "select by one": lambda x: lax.select_n(lax.gt(x[0, 0], 0.0), x, 2 * x),
+    "pad": lambda x: lax.pad(x, 7.0, ((1, 0, 0), (0, 2, 0))),
+    "pad between": lambda x: lax.pad(x, 7.0, ((1, 0, 1), (0, -1, 0))),
+    "stack": lambda x: jnp.stack([x, x[::-1]], axis=1),
+    "split": lambda x: lax.split(x, (1, 2), axis=1)[1],
+    "slice": lambda x: lax.dynamic_slice(x, (1, 2), (1, 2)),
+}
+
+
+@pytest.mark.parametrize("name", sorted(_KNOWN))
+def test_numbers_that_are_known_while_tracing(name):
+    """The same as by JAX; the common operations compile nothing."""
+    expected, compiled = np.asarray(_KNOWN[name](jnp.asarray(_TABLE))), []
+
+    def listen(event, duration, **about):
+        if "backend_compile" in event:
+            compiled.append(about)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        made = Mapped(lambda _, own: list(_KNOWN[name](_TABLE).ravel()), 0, 1)
+        found = made(np.zeros(0), np.zeros((1, 1)))[0]
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+    assert_equal(found, expected.astype(float).ravel())
+    assert not compiled or name == "pad between"

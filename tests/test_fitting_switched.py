@@ -12,6 +12,7 @@ from jax.flatten_util import ravel_pytree
 
 import jaxcam
 from jaxcam.fitting import (
+    Doubt,
     fit,
     free_run,
     Model,
@@ -163,6 +164,36 @@ def test_a_piece_meets_the_events_of_the_event_loop(name):
     (_, slopes, wanted), (coarse, _, expected) = every(point)
     assert np.max(np.abs(coarse - expected)) < 1e-8
     assert np.max(np.abs(slopes - wanted)) < 1e-6 * float(np.max(np.abs(wanted)))
+
+
+class Flicker(SwitchedSystem):
+    """An oscillator whose stiffness changes at every zero of a fast cosine."""
+
+    state_names = ("position", "velocity")
+    stiffness: jax.Array = eqx.field(default=60.0, converter=jnp.asarray)
+    rate: jax.Array = eqx.field(default=20.0, converter=jnp.asarray)
+
+    def switching(self, t, state):
+        return jnp.cos(self.rate * t)
+
+    def branch(self, t, state, sides):
+        force = -(self.stiffness + 5.0 * sides[0]) * state[0]
+        return jnp.stack([state[1], force])
+
+
+@pytest.mark.parametrize(("rate", "crowded"), [(20.0, False), (600.0, True)])
+def test_more_events_in_a_piece_than_are_located_are_said(rate, crowded):
+    """At most one switch in a piece of 50 ms, and nine or ten."""
+    rng, start = np.random.default_rng(2), jnp.array([0.1, 0.0])
+    run = record(Flicker(rate=rate), SENSORS, 2.0, rng=rng, state=start)
+    model = Model(Flicker(rate=rate, stiffness=60.5), SENSORS)
+    free = [Parameter("stiffness", lambda m: m.system.stiffness, tolerance=2.0)]
+    found = fit(Problem.build(model, segment_by_model(model, [run]), free))
+    doubts = [one.doubt for one in found.reasons]
+    assert (Doubt.TOO_MANY_EVENTS in doubts) == crowded
+    assert found.converged != crowded
+    if crowded:
+        assert "more than 8 switching events" in found.message
 
 
 @pytest.fixture(scope="module")

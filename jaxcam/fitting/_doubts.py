@@ -5,7 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .engine import Costs, FLIGHT, IMPACT, Point, Problem, Weights
+from .engine import (
+    Costs,
+    crowded_pieces,
+    EVENTS,
+    FLIGHT,
+    IMPACT,
+    Point,
+    Problem,
+    Weights,
+)
 
 
 # Cost per sample, or per component of a joint, that noise does not explain: with noise
@@ -31,6 +40,7 @@ class Doubt(enum.Enum):
     FAR_FROM_DATA = "the cost is far above what the noise explains"
     ON_A_BOUND = "a parameter is at a bound"
     NOT_CONSTRAINED = "the data do not constrain a parameter"
+    TOO_MANY_EVENTS = "a piece of a recording contains more events than are located"
 
 
 class Reason(NamedTuple):
@@ -136,3 +146,22 @@ def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
                     f"error is meaningless; widen the bound or fix the parameter."
                 )
     return found
+
+
+def too_many_events(problem: Problem, point: Point) -> str:
+    """Return a sentence if the fit has ignored switching events, otherwise an empty
+    string.
+    """
+    crowded = crowded_pieces(problem, point)
+    if not np.any(crowded):
+        return ""
+    r, k = np.argwhere(crowded)[0]
+    when = float(np.asarray(problem.pieces.flown.start)[r, k])
+    return (
+        f"In {np.sum(crowded)} of the pieces into which the recordings are divided, "
+        f"the model has more than {EVENTS} switching events, of which a fit locates "
+        f"only the first {EVENTS}; the first such piece is that of "
+        f"{problem.records[r]} at {when:.4g} s. If the model switches so often only "
+        "for the present parameters, start from others; otherwise replace the "
+        "switching by a smooth law."
+    )

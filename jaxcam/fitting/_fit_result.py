@@ -10,7 +10,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ..tables import ShortTable
-from ._doubts import Doubt, far_from_data, not_finite, on_a_bound, Reason
+from ._doubts import (
+    Doubt,
+    far_from_data,
+    not_finite,
+    on_a_bound,
+    Reason,
+    too_many_events,
+)
 from ._ellipse import Ellipse, ellipse_of, most_correlated
 from ._unconstrained import Unconstrained, unconstrained
 from .engine import (
@@ -127,6 +134,8 @@ class Fit:
         else:
             far = far_from_data(self.problem, self.costs, self.weights)
             found += [Reason(Doubt.FAR_FROM_DATA, far)] if far else []
+            many = too_many_events(self.problem, self.point)
+            found += [Reason(Doubt.TOO_MANY_EVENTS, many)] if many else []
         bounds = on_a_bound(self.problem, self.free, self.point)
         found += [Reason(Doubt.ON_A_BOUND, one) for one in bounds]
         found += [

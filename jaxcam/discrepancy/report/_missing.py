@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...fitting import Fit
+from ...hybrid.programs import program
 from ..search import Free, free_term, Hidden, Missing
 from ..terms import (
     Factor,
@@ -146,7 +147,7 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
     covariance = found.covariance[np.ix_(rows, rows)]
     along = np.linspace(family.low, family.high, points)
     if one.primitive is not None:
-        along = _graded(along, lambda x: _values(one, x, numbers))
+        along = _graded(along, lambda x: _curve(one, x, numbers)[0])
     value, basis = _curve(one, along, numbers)
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
     arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
@@ -231,33 +232,33 @@ def slopes_of_function(
     )
     along = jnp.linspace(term.low, term.high, points)
     direction = jnp.tanh(along / term.slip) * term.jumping
-    count = len(one.numbers)
-
-    def values(numbers):
-        every = (*numbers, *term.coefficients[count:])
-        fresh = eqx.tree_at(lambda f: f.coefficients, term, every).prepared()
-        return jax.vmap(fresh.at)(along, direction)
-
-    return np.asarray(jax.jacfwd(values)(jnp.stack(term.coefficients[:count])))
+    numbers = jnp.stack(term.coefficients[: len(one.numbers)])
+    return np.asarray(_with_slopes(term, along, direction, numbers)[1])
 
 
 def _curve(one: Free, along, numbers):
     """Return the function without its factor, and its derivatives with respect to its
     parameters.
     """
-    start = jnp.asarray(numbers)
-    slopes = jax.jacfwd(lambda numbers: _values(one, along, numbers))(start)
-    return np.asarray(_values(one, along, start)), np.asarray(slopes)
-
-
-def _values(one: Free, along, numbers):
-    """Return the function without its factor."""
     family = one.family
     direction = np.tanh(along / family.slip) if family.jumps else np.zeros(len(along))
-    free = free_term(family, one.slot, one.primitive).exact()
-    every = (*numbers, *free.coefficients[len(numbers) :])
-    term = eqx.tree_at(lambda f: f.coefficients, free, tuple(every)).prepared()
-    return jax.vmap(term.at)(jnp.asarray(along), jnp.asarray(direction))
+    term = free_term(family, one.slot, one.primitive).exact()
+    made = _with_slopes(term, np.asarray(along), direction, np.asarray(numbers))
+    return tuple(map(np.asarray, made))
+
+
+@program
+def _with_slopes(term: FreeFunction, along, direction, numbers):
+    """Return a function without its factor, and its derivatives with respect to its
+    first coefficients.
+    """
+
+    def values(numbers):
+        every = (*numbers, *term.coefficients[len(numbers) :])
+        fresh = eqx.tree_at(lambda f: f.coefficients, term, every).prepared()
+        return jax.vmap(fresh.at)(along, direction)
+
+    return values(numbers), jax.jacfwd(values)(numbers)
 
 
 def _unit(family: Family) -> str:

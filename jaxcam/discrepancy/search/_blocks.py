@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
@@ -75,16 +76,14 @@ def blocks_of(
             local,
             scales,
         )
-        found = eliminate_states(found)
+        found = jax.tree.map(np.asarray, eliminate_states(found))
         for r, (name, place) in enumerate(zip(problem.records, columns.place)):
             # a parameter with separate values has a row for each recording
             used = np.flatnonzero(place >= 0)
             rows = place[used]
             whole, right = np.zeros((size, size)), np.zeros(size)
-            whole[np.ix_(rows, rows)] = np.asarray(found.information[r])[
-                np.ix_(used, used)
-            ]
-            right[rows] = np.asarray(found.score[r])[used]
+            whole[np.ix_(rows, rows)] = found.information[r][np.ix_(used, used)]
+            right[rows] = found.score[r][used]
             record.append(name)
             start.append(max(a, 0.0))
             information.append(whole)

@@ -149,8 +149,8 @@ def force_blocks(
     if decoy:
         forces = _in_reverse(response, forces)
     width, size = forces.shape[-1], len(response.prior)
-    chain = jax.vmap(chained)(_onto(response, forces))
-    found = eliminate_states(jax.tree.map(jnp.asarray, chain))
+    chain = _chained(_onto(response, forces))
+    found = jax.tree.map(np.asarray, eliminate_states(chain))
     information, score = [], []
     total = size + width
     for r, place in enumerate(response.place):
@@ -158,10 +158,8 @@ def force_blocks(
         rows = np.concatenate([place[used], size + np.arange(width)])
         local = np.concatenate([used, len(place) + np.arange(width)])
         whole, right = np.zeros((total, total)), np.zeros(total)
-        whole[np.ix_(rows, rows)] = np.asarray(found.information[r])[
-            np.ix_(local, local)
-        ]
-        right[rows] = np.asarray(found.score[r])[local]
+        whole[np.ix_(rows, rows)] = found.information[r][np.ix_(local, local)]
+        right[rows] = found.score[r][local]
         information.append(whole)
         score.append(right)
     none = np.zeros(width)
@@ -198,6 +196,12 @@ def forces_at_nodes(
     terms = tuple(terms)
     every = _forces(problem.layout, problem.pieces, response.point, terms)
     return np.asarray(every)[:, :, :: stride_of(problem)]
+
+
+@program
+def _chained(pieces: LinearPieces):
+    """Return the normal equations of all recordings."""
+    return jax.vmap(chained)(pieces)
 
 
 def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPieces:

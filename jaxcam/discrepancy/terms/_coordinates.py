@@ -3,9 +3,10 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from ...hybrid import HybridSystem
+from ...hybrid.programs import program
 
 
 # Number of random points near a recorded state at which the field is evaluated
@@ -27,14 +28,9 @@ def coordinates(
     """
     state = np.asarray(state, dtype=float)
     size = np.maximum(np.abs(state), 1e-3)
-    slope = jax.jacfwd(lambda x: system.vector_field(jnp.asarray(0.0), x))
     random = np.random.default_rng(0)
-    seen = np.stack(
-        [
-            np.asarray(slope(jnp.asarray(state + 0.01 * size * shift)))
-            for shift in random.standard_normal((_LOOKS, len(state)))
-        ]
-    )
+    shifts = random.standard_normal((_LOOKS, len(state)))
+    seen = np.asarray(_slopes(system, state + 0.01 * size * shifts))
     found = []
     for place in range(len(state)):
         rows = seen[:, place]
@@ -48,3 +44,10 @@ def coordinates(
             "velocities."
         )
     return tuple(found)
+
+
+@program
+def _slopes(system: HybridSystem, states) -> Float[Array, "k n n"]:
+    """Return the Jacobians of the vector field at some states."""
+    slope = jax.jacfwd(lambda x: system.vector_field(jnp.asarray(0.0), x))
+    return jax.vmap(slope)(states)

@@ -17,6 +17,7 @@ from ._eliminate import (
     Reduced as Reduced,
     state_steps as state_steps,
 )
+from ._event_limit import crowded_pieces as crowded_pieces
 from ._known_constants import with_constants as with_constants
 from ._layout import Layout as Layout
 from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
@@ -51,4 +52,4 @@ from ._problem_checks import parameter_places as parameter_places
 from ._seen_directly import shows_directly as shows_directly
 from ._sharpness import loosened as loosened, separated as separated
 from ._starts import state_size as state_size
-from ._switched_steps import switched_nodes as switched_nodes
+from ._switched_steps import EVENTS as EVENTS, switched_nodes as switched_nodes

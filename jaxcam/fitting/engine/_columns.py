@@ -105,9 +105,10 @@ def gathered(columns: Columns, found):
     """Sum over the recordings, adding each value in its place."""
     size = len(columns.scale)
     information, score = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
-    for r, place in enumerate(columns.place):
-        np.add.at(information, np.ix_(place, place), np.asarray(found.information[r]))
-        np.add.at(score, place, np.asarray(found.score[r]))
+    each = zip(columns.place, np.asarray(found.information), np.asarray(found.score))
+    for place, inside, pull in each:
+        np.add.at(information, np.ix_(place, place), inside)
+        np.add.at(score, place, pull)
     return information[:size, :size], score[:size]
 
 

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from ...hybrid.caches import Cache
 
@@ -42,7 +43,8 @@ def each_record(function: Callable[[int], T], records: int, args: Any) -> T:
             parts = [*first, *pool.map(ready, rest)]
     else:
         parts = [*first, *map(function, rest)]
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *parts)
+    # stacked by numpy: JAX would compile a program for each shape
+    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *parts)
 
 
 def kinds(args) -> Hashable:

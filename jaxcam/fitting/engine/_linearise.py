@@ -236,11 +236,11 @@ def total_cost(costs: Costs, extras) -> float:
     Returns:
         The cost.
     """
-    before = jnp.concatenate([extras.weight[:, :1], extras.weight[:, :-1]], axis=1)
-    shared = jnp.minimum(extras.weight, before)
+    weight, rest_weight = np.asarray(extras.weight), np.asarray(extras.rest_weight)
+    before = np.concatenate([weight[:, :1], weight[:, :-1]], axis=1)
     parts = (
-        jnp.sum(extras.weight * costs.flown),
-        jnp.sum(shared * costs.joints),
-        jnp.sum(extras.rest_weight * costs.rested),
+        (weight, costs.flown),
+        (np.minimum(weight, before), costs.joints),
+        (rest_weight, costs.rested),
     )
-    return float(sum(parts))
+    return float(sum(np.sum(share * np.asarray(cost)) for share, cost in parts))

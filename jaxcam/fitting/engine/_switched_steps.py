@@ -29,7 +29,7 @@ from ._modes import (
 
 
 # Events that are located in a piece; pieces are shorter than half an oscillation
-_EVENTS = 8
+EVENTS = 8
 # Runge-Kutta steps that locate an event: to the end, of length zero, and those of the
 # Illinois method
 _SEARCH = 10
@@ -106,7 +106,7 @@ def switched_nodes(
     drive: DriveState,
     substeps,
     mode: Mode | None = None,
-    events: int = _EVENTS,
+    events: int = EVENTS,
 ):
     """Return the states at the ends of all steps `(n + 1, s)`, their rates, and the
     mode at the end.
@@ -130,14 +130,26 @@ def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
     """Return the state at the end, `(s,)`, without derivatives; `substeps` may be
     traced.
     """
-    steps, mode = _steps(model, state, start, step, drive, None, _EVENTS)
+    return _ended(model, state, start, step, drive, substeps, EVENTS).state
+
+
+def has_more_events(model: Model, state, start, step, drive: DriveState, substeps):
+    """Return whether a piece has more events than are located; `substeps` may be
+    traced.
+    """
+    found = _ended(model, state, start, step, drive, substeps, EVENTS + 1)
+    return found.events > EVENTS
+
+
+def _ended(model: Model, state, start, step, drive: DriveState, substeps, events):
+    """Return the end of a piece of at most that many events, without derivatives."""
+    steps, mode = _steps(model, state, start, step, drive, None, events)
     advance = _advancing(steps, substeps)
-    found = jax.lax.while_loop(
+    return jax.lax.while_loop(
         lambda one: one.place < steps.count * substeps,
         lambda one: advance(one)[0],
         _begun(steps, state, mode),
     )
-    return found.state
 
 
 def _steps(model: Model, state, start, step, drive: DriveState, mode, events):

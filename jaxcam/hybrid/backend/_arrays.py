@@ -46,6 +46,9 @@ def moved(equation, inputs) -> list[np.ndarray]:
     simple = rearranged(equation, inputs)
     if simple is not None:
         return [simple]
+    if equation.primitive.name == "split":
+        cuts = np.cumsum(equation.params["sizes"])[:-1]
+        return np.split(inputs[0], cuts, axis=equation.params["axis"])
     numbers = _indices_of(equation.primitive.name, len(inputs))
     flat, sent = [], []
     for i, elements in enumerate(inputs):

@@ -12,6 +12,7 @@ import numpy as np
 
 
 _NUMPY = {
+    "abs": np.abs,
     "add": np.add,
     "add_any": np.add,
     "and": np.bitwise_and,
@@ -26,6 +27,7 @@ _NUMPY = {
     "mul": np.multiply,
     "ne": np.not_equal,
     "neg": np.negative,
+    "not": np.invert,
     "or": np.bitwise_or,
     "sub": np.subtract,
 }
@@ -64,6 +66,8 @@ def computed(equation, arrays) -> list[np.ndarray]:
             made = arrays
         elif name == "reduce_sum":
             made = [np.sum(arrays[0], axis=tuple(params["axes"]))]
+        elif name == "select_n":
+            made = [np.choose(arrays[0].astype(int), arrays[1:])]
         elif name == "iota":
             made = [np.indices(params["shape"])[params["dimension"]]]
         else:

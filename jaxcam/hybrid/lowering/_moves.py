@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._elements import join_traced, split
-from ._known import join_known
+from ._known import is_known, join_known
 
 
 MOVES = frozenset(
@@ -39,8 +39,14 @@ def rearranged(equation, inputs) -> np.ndarray | None:
         strides = params["strides"] or (1,) * first.ndim
         cuts = zip(params["start_indices"], params["limit_indices"], strides)
         return first[tuple(slice(*c) for c in cuts)]
+    if name == "dynamic_slice":
+        return _slice_at(first, inputs[1:], params["slice_sizes"])
     if name == "concatenate":
         return np.concatenate(inputs, axis=params["dimension"])
+    if name == "stack":
+        return np.stack(inputs, axis=params["axis"])
+    if name == "pad":
+        return _padded(first, inputs[1][()], params["padding_config"])
     if name == "transpose":
         return first.transpose(params["permutation"])
     if name == "broadcast_in_dim":
@@ -50,6 +56,30 @@ def rearranged(equation, inputs) -> np.ndarray | None:
             sizes[dimension] = first.shape[axis]
         return np.broadcast_to(first.reshape(sizes), shape).copy()
     return None
+
+
+@no_type_check
+def _slice_at(array, starts, sizes) -> np.ndarray | None:
+    """Return the slice that begins at known indices; otherwise `None`."""
+    indices = [start[()] for start in starts]
+    if not all(map(is_known, indices)):
+        return None
+    spans = zip(indices, sizes, array.shape, strict=True)
+    first = [int(np.clip(i, 0, most - size)) for i, size, most in spans]
+    return array[tuple(slice(k, k + n) for k, n in zip(first, sizes, strict=True))]
+
+
+@no_type_check
+def _padded(array, fill, config) -> np.ndarray | None:
+    """Return the array with equal elements around it; `None` for any other padding."""
+    if any(low < 0 or high < 0 or inner for low, high, inner in config):
+        return None
+    shape = [n + low + high for n, (low, high, _) in zip(array.shape, config)]
+    out = np.empty(shape, dtype=object)
+    out.fill(fill)
+    spans = zip(array.shape, config, strict=True)
+    out[tuple(slice(low, low + n) for n, (low, _, _) in spans)] = array
+    return out
 
 
 def moved(equation, inputs, memory):
