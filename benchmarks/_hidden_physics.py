@@ -90,6 +90,12 @@ EFFECTS = {
     "detents": _force(
         _AT_PLACE, lambda u, w, phi, t, s: np.sin(2 * np.pi * 1.8 * u), 0.03, 0.1
     ),
+    "backlash": _force(
+        _AT_PLACE,
+        lambda u, w, phi, t, s: np.clip(u, -0.3, 0.3) - u,
+        0.15,
+        0.5,
+    ),
     # of velocity
     "fast_drag": _force(
         _AT_SPEED,
@@ -103,6 +109,8 @@ EFFECTS = {
         0.02,
         0.06,
     ),
+    "one_way": _force(_AT_SPEED, lambda u, w, phi, t, s: -1.0 * (w > 0), 0.02, 0.06),
+    "cubic_drag": _force(_AT_SPEED, lambda u, w, phi, t, s: -(w**3), 0.08, 0.25),
     # of position and velocity
     "zone_friction": _force(
         _ON_THE_WAY,
@@ -116,6 +124,12 @@ EFFECTS = {
         0.05,
         0.2,
     ),
+    "eddy_brake": _force(
+        _ON_THE_WAY,
+        lambda u, w, phi, t, s: -w * np.exp(-(((u + 0.2) / 0.25) ** 2)),
+        0.05,
+        0.15,
+    ),
     # of the drive angle
     "pulse": _force(
         ("phase",), lambda u, w, phi, t, s: 1.0 * (np.cos(phi - 2.0) > 0.6), 0.02, 0.06
@@ -126,10 +140,29 @@ EFFECTS = {
         0.03,
         0.1,
     ),
+    "ratchet": _force(
+        ("phase",),
+        lambda u, w, phi, t, s: np.cos(2 * phi) + 0.5 * np.sin(3 * phi),
+        0.02,
+        0.06,
+    ),
+    "pumping": _force(
+        ("phase", "velocity"),
+        lambda u, w, phi, t, s: -w * np.cos(phi - 0.5),
+        0.05,
+        0.15,
+    ),
     # of time
     "ramp": _force(("time",), lambda u, w, phi, t, s: t, 0.02, 0.06),
     "jolt": _force(("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.55), 0.02, 0.06),
     "warming": _force(("time", "velocity"), lambda u, w, phi, t, s: w * t, 0.02, 0.06),
+    "fading": _force(("time",), lambda u, w, phi, t, s: np.exp(-5 * t), 0.02, 0.06),
+    "seizing": _force(
+        ("time", "velocity"),
+        lambda u, w, phi, t, s: -np.sign(w) * t,
+        0.01,
+        0.03,
+    ),
     # with memory
     "relaxing": _force(
         ("memory",),
@@ -162,6 +195,12 @@ EFFECTS = {
         lambda u, w, phi, t, s: -1.0 * (s > 0.55),
         (0.05, 0.15),
     ),
+    "soft_band": Effect(
+        "restitution",
+        ("speed",),
+        lambda u, w, phi, t, s: -np.exp(-(((s - 0.45) / 0.12) ** 2)),
+        (0.05, 0.15),
+    ),
     "wear": Effect(
         "restitution", ("time",), lambda u, w, phi, t, s: -(t**2), (0.05, 0.15)
     ),
@@ -184,6 +223,9 @@ EFFECTS = {
     ),
     "drift": Effect(
         "sensor", ("time",), lambda u, w, phi, t, s: np.sin(2.2 * t), (6.0, 20.0)
+    ),
+    "slipped": Effect(
+        "sensor", ("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.4), (3.0, 10.0)
     ),
     "pickup": Effect(
         "sensor", ("phase",), lambda u, w, phi, t, s: np.cos(phi - 1.0), (2.0, 8.0)
