@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxcam.hybrid import SwitchedSystem
-from jaxcam.hybrid.checks import is_traced
+from jaxcam.hybrid.programs import is_traced
 from jaxcam.hybrid.surface import InMode, Jumps, OnSides, resets, switching_distances
 from jaxcam.parameters import VectorLike
 

@@ -14,11 +14,11 @@ from ._event_counts import EventCounts
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
-from .checks import check_system, is_traced
+from .checks import check_system
 from .codes import RUNNING
 from .loop import first_state, Functions, iteration, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
-from .programs import is_tracing
+from .programs import is_traced, is_tracing
 
 
 # iterations between two checks of whether any batch element is still running

@@ -16,11 +16,11 @@ from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from ._types import RealScalar
 from ._untraced import prepare, run_untraced
-from .checks import check_start, is_traced
+from .checks import check_start
 from .codes import PAINLEVE, RUNNING
 from .loop import Log, LoopState, run, run_reversible
 from .lowering import whole
-from .programs import program
+from .programs import is_traced, program
 from .record import (
     assemble,
     Contacts,

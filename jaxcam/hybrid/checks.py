@@ -6,7 +6,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 
 from ._prepared import prepared
@@ -15,12 +14,8 @@ from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from .backend import Rowwise
 from .loop import starts_behind
+from .programs import is_traced
 from .surface import check_restitution, restitutions
-
-
-def is_traced(tree) -> bool:
-    """Return whether any array in `tree` is traced, so that its value is unknown."""
-    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
 def refuse_tracers(name: str, instead: str, *arguments) -> None:

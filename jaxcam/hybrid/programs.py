@@ -19,6 +19,11 @@ T = TypeVar("T")
 _OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 
 
+def is_traced(tree) -> bool:
+    """Return whether any array in `tree` is traced, so that its value is unknown."""
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
+
+
 def is_tracing() -> bool:
     """Return whether a computation is being traced into a program, as inside `jit`."""
     return isinstance(jax.lax.stop_gradient(0.0), Tracer)
@@ -27,8 +32,8 @@ def is_tracing() -> bool:
 def program(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a function when it is first called, as `equinox.filter_jit` does.
 
-    This takes about half the time, and the program runs as fast. Within another
-    compiled function, the options of that function apply.
+    This takes about half the time, and the program runs as fast. For traced arguments
+    and within another compiled function, it is compiled with the usual options.
 
     Args:
         function: The function.
@@ -37,11 +42,12 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
         The compiled function.
     """
     jitted: Any = eqx.filter_jit
-    # XLA takes its options from the outermost program, and JAX refuses others
+    # JAX refuses options within another program, and in reverse derivatives
     inner, outermost = jitted(function), jitted(function, compiler_options=_OPTIONS)
 
     @functools.wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
-        return (inner if is_tracing() else outermost)(*args, **kwargs)
+        within = is_tracing() or is_traced((args, kwargs))
+        return (inner if within else outermost)(*args, **kwargs)
 
     return call

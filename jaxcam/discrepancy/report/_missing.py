@@ -1,7 +1,7 @@
 """Report unnamed physics as a table, in words, and as part of the verdict."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -24,6 +24,7 @@ from ..terms import (
     Variable,
     Where,
 )
+from ._close_forms import CloseForm
 from ._formula import formula_of
 from ._hidden import hidden_formula, hidden_table, hidden_unit, hidden_words
 
@@ -63,6 +64,7 @@ class MissingFunction:
       `(n,)` or `(n, m)`.
     - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
+    - `nearly`: otherwise the formula of the closest form, if it is close.
     - `element`: for a force with an internal state, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
     - `gap`: for an effect at impacts or of the surface, the name of the gap if there
@@ -81,6 +83,7 @@ class MissingFunction:
     element: HiddenElement | None = None
     numbers: tuple[str, ...] = ()
     gap: str = ""
+    nearly: str | None = None
 
     @property
     def slot(self) -> str:
@@ -96,6 +99,7 @@ class MissingFunction:
             "table": table,
             "unit": self.unit,
             "formula": self.formula,
+            "nearly": self.nearly,
             "gap": self.gap or None,
             "words": self.words,
             "records": list(self.records),
@@ -107,16 +111,18 @@ def missing_functions(
     velocities: tuple[float, float],
     positions: tuple[float, float],
     points: int,
+    close: Mapping[str, CloseForm],
 ) -> tuple[MissingFunction, ...]:
     """Return the functions found, each with its errors.
 
     **Arguments:** the functions found, the ranges of the motion (for the tables of
-    functions of two arguments), and the number of points of each grid.
+    functions of two arguments), the number of points of each grid, and the forms that
+    are close to functions, by their slots.
     """
     return tuple(
         _hidden(missing.fit, one, points)
         if isinstance(one, Hidden)
-        else _one(missing.fit, one, velocities, positions, points)
+        else _one(missing.fit, one, velocities, positions, points, close.get(one.slot))
         for one in missing.functions
     )
 
@@ -139,7 +145,14 @@ def _hidden(found: Fit, hidden: Hidden, points: int) -> MissingFunction:
     )
 
 
-def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFunction:
+def _one(
+    found: Fit,
+    one: Free,
+    velocities,
+    positions,
+    points: int,
+    close: CloseForm | None,
+) -> MissingFunction:
     family, kind = one.family, _KINDS[one.family.where]
     labels = [estimate.name for estimate in found.estimates]
     rows = [labels.index(name) for name in one.coefficients]
@@ -154,6 +167,10 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
     words, formula = _words(family, kind, along, value, error), None
     if one.primitive is not None:
         formula, words = formula_of(family, one.primitive, numbers, kind)
+    nearly = None
+    if close is not None:
+        nearly, said = _formula(close.fit, close.form)
+        words = f"{words}; to within {close.percent:.2g} %, it is {said}"
     if kind == "restitution":
         value, error = np.exp(value), np.exp(value) * error
     grid: tuple[np.ndarray, ...] = (along,)
@@ -180,7 +197,16 @@ def _one(found: Fit, one: Free, velocities, positions, points: int) -> MissingFu
         formula,
         numbers=tuple(one.coefficients),
         gap=gap,
+        nearly=nearly,
     )
+
+
+def _formula(found: Fit, form: Free) -> tuple[str, str]:
+    """Return the formula of a fitted form, and a sentence about it."""
+    assert form.primitive is not None
+    numbers = np.array([found[name].value for name in form.coefficients])
+    kind = _KINDS[form.family.where]
+    return formula_of(form.family, form.primitive, numbers, kind)
 
 
 def _gap_name(found: Fit, family: Family) -> str:
@@ -215,8 +241,7 @@ def named_function(found: Fit, one: Free | Hidden) -> str:
     kind = _KINDS[one.family.where]
     if one.primitive is None:
         return f"{kind} as a function of {' and '.join(one.family.arguments)}"
-    numbers = np.array([found[name].value for name in one.coefficients])
-    return f"{kind} {formula_of(one.family, one.primitive, numbers, kind)[0]}"
+    return f"{kind} {_formula(found, one)[0]}"
 
 
 def slopes_of_function(

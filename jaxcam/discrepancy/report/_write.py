@@ -34,6 +34,7 @@ from ._caveats import (
     noisier_than_stated,
     small_remainder,
 )
+from ._close_forms import close_forms
 from ._diagnosis import Diagnosis, Verdict
 from ._effects import (
     drive_effect,
@@ -135,8 +136,16 @@ def _of_functions(
     """Return the diagnosis if unnamed functions were found."""
     policy, held, found = trials.policy, choice.held, missing.fit
     positions, velocities, _, _ = visited_states(question.problem).ranges(policy)
-    functions = missing_functions(missing, velocities, positions, policy.shape_points)
     bare = choice.before
+    close = close_forms(
+        missing,
+        [rival.missing for rival in choice.rivals],
+        bare.fit.cost - found.cost,
+        policy.small,
+    )
+    functions = missing_functions(
+        missing, velocities, positions, policy.shape_points, close
+    )
     divided = shares(bare.fit, found, needs.lost, 0.0, policy)
     effects = missing_effects(trials, functions, missing, needs, choice, divided)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):

@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 
 from ...tables import ShortTable
-from ..checks import is_traced
+from ..programs import is_traced
 
 
 class Printed(eqx.Module):

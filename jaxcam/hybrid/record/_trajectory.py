@@ -8,9 +8,9 @@ from jaxtyping import Array, Float, Int
 from ...tables import ShortTable
 from .._settings import Settings
 from .._system import HybridSystem
-from ..checks import is_traced, refuse_tracers
+from ..checks import refuse_tracers
 from ..codes import message
-from ..programs import is_tracing, program
+from ..programs import is_traced, is_tracing, program
 from ..surface import gaps
 from ._events import Contacts, Impacts, Steps, Switches
 from ._printed import Printed
