@@ -45,6 +45,9 @@ def test_carried_states_start_where_the_last_value_ended():
     own = Stroboscopic(ImpactOscillator(omega=2.62, restitution=0.8), lanes=8)
     again = own.sample(made.states[0, :, -1], 30, 5).states
     assert np.array_equal(made.states[1], again)
+    # the way down starts from the end of the way up
+    down = own.sample(made.states[1, :, -1], 30, 5).states
+    assert np.array_equal(made.states[2], down)
 
 
 def test_seconds_of_a_rig_in_whole_turns(tmp_path):

@@ -1,5 +1,6 @@
-"""A progress bar on standard error."""
+"""A progress bar on standard error, or lines if it is not a terminal."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -17,11 +18,16 @@ COMPILING = "compiling (the first run of a system takes longest)"
 """First message of commands that compile before they compute."""
 
 
+# least time (s) between lines
+_INTERVAL = 30.0
+
+
 @contextmanager
 def progress(first: str) -> Iterator[Callable[[str, float | None], None]]:
     """Yield `report(sentence, fraction)`; the fraction is None if unknown.
 
-    Nothing is shown unless standard error is a terminal.
+    If standard error is not a terminal, the latest sentence is written as a line, at
+    most twice a minute.
     """
     console = Console(stderr=True)
     columns = (
@@ -32,9 +38,16 @@ def progress(first: str) -> Iterator[Callable[[str, float | None], None]]:
     )
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
-        task = bar.add_task(first, total=None)
+        task, written = bar.add_task(first, total=None), time.monotonic()
 
         def report(what: str, fraction: float | None) -> None:
+            nonlocal written
+            if not shown and time.monotonic() - written >= _INTERVAL:
+                written = time.monotonic()
+                done = "" if fraction is None else f" ({fraction:.0%})"
+                console.print(
+                    f"{what}{done}", markup=False, highlight=False, soft_wrap=True
+                )
             total = None if fraction is None else 1.0
             bar.update(task, description=what, total=total, completed=fraction or 0.0)
 

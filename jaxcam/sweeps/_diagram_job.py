@@ -124,7 +124,8 @@ class CarriedJob(DiagramJob):
         index = np.concatenate([order[::way] for way in ways])
         going = np.repeat(np.array(ways, dtype=np.int8), len(values))
         self.first = np.zeros(len(index), dtype=bool)
-        self.first[:: len(values)] = True
+        # the way down starts from the final state of the way up
+        self.first[0] = True
         return values[index], starts[index], going
 
     def _block(self, starts: int) -> int:

@@ -39,24 +39,44 @@ def formulated(
         one = _in_slot(found, slot)
         if isinstance(one, Hidden) or not one.smooth:
             continue
-        least = -math.inf
-        sound: list[Missing] = []
-        for gain, primitive, numbers in _promising(fits, found, one):
-            if gain < least:
-                break
-            progress(f"fitting a formula: {primitive.name}", None)
-            trial = _fitted(fits, found, apart, one, primitive, numbers, small)
-            if trial is None or not _sound(trial, one):
-                continue
-            sound.append(trial)
-            if trial.score < found.score:
-                # only a form that promises as much may have more evidence
-                least = max(least, gain - fits.policy.leads)
+        sound = _tried(fits, found, apart, one, small, progress)
         tried += sound
         best = min(sound, key=lambda trial: trial.score, default=found)
         if best.score < found.score + fits.policy.form_loss:
             found = best
     return found, tried
+
+
+def _tried(
+    fits: FreeFits, found: Missing, apart: Problem, one: Free, small: float, progress
+) -> list[Missing]:
+    """Fit the promising forms of a function; return the fits that make sense.
+
+    A form with an exponent is followed by its special case for an exponent of one,
+    which has one parameter less.
+    """
+    sound: list[Missing] = []
+    waiting, done, least = _promising(fits, found, one), set(), -math.inf
+    while waiting:
+        gain, primitive, numbers = waiting.pop(0)
+        if gain < least:
+            break
+        if primitive.name in done:
+            continue
+        done.add(primitive.name)
+        progress(f"fitting a formula: {primitive.name}", None)
+        trial = _fitted(fits, found, apart, one, primitive, numbers, small)
+        if trial is None or not _sound(trial, one):
+            continue
+        sound.append(trial)
+        if trial.score < found.score:
+            # only a form that promises as much may have more evidence
+            least = max(least, gain - fits.policy.leads)
+        if primitive.special is not None:
+            names = _in_slot(trial, one.slot).coefficients[:-1]
+            start = np.array([trial.fit[name].value for name in names])
+            waiting.insert(0, (gain, primitive.special, start))
+    return sound
 
 
 def _in_slot(found: Missing, slot: str):

@@ -54,6 +54,7 @@ class Primitive(NamedTuple):
     - `ends`: further positions, as a function of the parameters.
     - `apart`: for a form that jumps at edges, the distance between them as a fraction
         of the range, as a function of the parameters.
+    - `special`: the form that it is for an exponent of one, its last parameter.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Primitive(NamedTuple):
     positive: tuple[int, ...] = ()
     ends: Callable | None = None
     apart: Callable | None = None
+    special: Any = None
 
     def within(self, numbers) -> bool:
         """Return whether the positions lie in the range of the argument, in their
@@ -171,6 +173,7 @@ POWER = Primitive(
     lambda at, p: p[0] * at.xp.maximum(at.u, _LEAST) ** p[1],
     ((0.5, 1.5, 2.0, 3.0),),
     (0.2,),
+    special=STRAIGHT,
 )
 CURVED_ABOVE = Primitive(
     "curved above",
@@ -179,6 +182,7 @@ CURVED_ABOVE = Primitive(
     (0.05, 0.2),
     places=(1,),
     positive=(2,),
+    special=ABOVE,
 )
 CURVED_BELOW = Primitive(
     "curved below",
@@ -187,6 +191,7 @@ CURVED_BELOW = Primitive(
     (0.05, 0.2),
     places=(1,),
     positive=(2,),
+    special=BELOW,
 )
 DEAD_ZONE = Primitive(
     "dead zone",
