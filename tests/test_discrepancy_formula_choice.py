@@ -1,6 +1,7 @@
 """Which forms are fitted in place of a free function, and which one is kept."""
 
 import types
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -8,10 +9,18 @@ from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search import _formulas
 
 
+class _Fit(NamedTuple):
+    cost: float
+    problem: Any
+
+    def __getitem__(self, name):
+        return types.SimpleNamespace(value=float("abc".index(name)))
+
+
 def _trial(score, cost=1000.0):
     samples = types.SimpleNamespace(samples=1000)
-    one = types.SimpleNamespace(slot="force_a", smooth=True)
-    found = types.SimpleNamespace(cost=cost, problem=samples)
+    one = types.SimpleNamespace(slot="force_a", smooth=True, coefficients="abc")
+    found = _Fit(cost, samples)
     return types.SimpleNamespace(score=score, functions=(one,), fit=found)
 
 
@@ -23,10 +32,13 @@ def chosen(monkeypatch, unchecked_types):
     def choose(forms):
         tried = []
         curve = _trial(1000.0)
-        ranked = [(gain, name, None) for name, (gain, _) in forms.items()]
+        ranked = [(gain, name, None) for name, (gain, _) in forms.items() if gain]
 
         def fitted(fits, found, apart, one, primitive, numbers, small):
             tried.append(primitive.name)
+            if primitive.special is None and numbers is not None:
+                # the special case starts from the fitted numbers but the last
+                assert numbers.tolist() == [0.0, 1.0]
             score = forms[primitive][1]
             return None if score is None else _trial(score)
 
@@ -42,6 +54,8 @@ def chosen(monkeypatch, unchecked_types):
 
 class Form(str):
     """A form that is only a name."""
+
+    special: Any = None
 
     @property
     def name(self):
@@ -66,3 +80,20 @@ def test_a_form_with_less_evidence_than_the_curve_is_not_kept(chosen):
     step, wave = Form("step"), Form("wave")
     assert chosen({step: (50.0, None), wave: (40.0, 1011.0)})[0] == 1000.0
     assert chosen({step: (50.0, 1009.0), wave: (40.0, 1011.0)})[0] == 1009.0
+
+
+def test_a_form_with_an_exponent_is_followed_by_that_of_one(chosen):
+    """It starts from the fitted edge and may win although it promised too little."""
+    power, line, bump = Form("power"), Form("line"), Form("bump")
+    power.special = line
+    forms = {bump: (90.0, 950.0), power: (80.0, 970.0), line: (None, 930.0)}
+    score, tried = chosen(forms)
+    assert tried == ["bump", "power", "line"] and score == 930.0
+
+
+def test_a_form_is_fitted_once(chosen):
+    """Its special case is among the promising forms as well."""
+    power, line = Form("power"), Form("line")
+    power.special = line
+    forms = {power: (80.0, 970.0), line: (79.0, 930.0)}
+    assert chosen(forms)[1] == ["power", "line"]

@@ -149,8 +149,27 @@ def test_outside_a_fit_the_derivatives_are_those_of_the_values():
         assert slope == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["wave", "bump", "above"])
-def test_a_form_without_jumps_has_the_derivatives_of_its_values(name):
+@pytest.mark.parametrize("name", ["above", "dead zone", "curved above"])
+def test_the_derivative_by_a_knee_changes_over_an_integration_step(name):
+    """If it jumped between the evaluations of a step, a fit of the knee would stop."""
+    stride = HIGH / 20
+    family = dataclasses.replace(_family(Variable.POSITION), stride=stride)
+    form = next(one for one in family.primitives if one.name == name)
+    numbers = {"above": [1.0, 0.6], "dead zone": [1.0, 0.4, 0.2]}
+    start = numbers.get(name, [1.0, 0.6, 1.0])
+    knee = family.low + 0.6 * (family.high - family.low)
+    at = knee + stride * jnp.array([-1.5, -0.4, 0.4, 1.5])
+
+    def values(place):
+        moved = [start[0], place, *start[2:], *[0.0] * (21 - form.count)]
+        return FREE[Where.FLIGHT].of(family, "a", moved, form).prepared().at(at)
+
+    slopes = jax.jacfwd(values)(jnp.asarray(start[1]))
+    assert slopes == pytest.approx([0.0, -0.18, -0.82, -1.0], abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["wave", "bump"])
+def test_a_form_without_edges_has_the_derivatives_of_its_values(name):
     """To 1e-6 of a central difference."""
     form = _form(name, HIGH / 10).prepared()
     for at in (0.41, 0.52, 0.83):

@@ -114,9 +114,10 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     different = differing(best.fit, trials.policy)
     settled = _settled(different, left, best.bic, trials.policy)
     without = None
-    if left and best.names and not settled:
+    if left and best.names:
+        # the terms may only imitate the differences
         without = differing(before.fit, trials.policy)
-        settled = _settled(without, left_before, best.bic, trials.policy)
+        settled |= _settled(without, left_before, best.bic, trials.policy)
     if left and trials.policy.functions and not settled:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed

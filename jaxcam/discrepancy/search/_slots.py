@@ -69,7 +69,7 @@ class Free:
     def jumps(self) -> bool:
         """Return whether it is a force that jumps at edges."""
         form = self.primitive
-        return self.where is Where.FLIGHT and form is not None and bool(form.apart)
+        return self.where is Where.FLIGHT and form is not None and form.sharp
 
     def price(self, samples: int) -> float:
         """Return the gain required for its parameters, without the Occam factor of its

@@ -52,8 +52,9 @@ class Primitive(NamedTuple):
       are two, the first is the lower one.
     - `positive`: the parameters that are lengths or exponents.
     - `ends`: further positions, as a function of the parameters.
-    - `apart`: for a form that jumps at edges, the distance between them as a fraction
-        of the range, as a function of the parameters.
+    - `apart`: for a form whose value or slope jumps at edges, the distance between them
+        as a fraction of the range, as a function of the parameters.
+    - `sharp`: whether its value jumps there.
     - `special`: the form that it is for an exponent of one, its last parameter.
     """
 
@@ -68,6 +69,7 @@ class Primitive(NamedTuple):
     ends: Callable | None = None
     apart: Callable | None = None
     special: Any = None
+    sharp: bool = False
 
     def within(self, numbers) -> bool:
         """Return whether the positions lie in the range of the argument, in their
@@ -129,6 +131,7 @@ ABOVE = Primitive(
     (_INSIDE,),
     (0.05,),
     places=(1,),
+    apart=lambda p: 1.0 + 0.0 * p[1],
 )
 BELOW = Primitive(
     "below",
@@ -136,6 +139,7 @@ BELOW = Primitive(
     (_INSIDE,),
     (0.05,),
     places=(1,),
+    apart=lambda p: 1.0 + 0.0 * p[1],
 )
 STEP = Primitive(
     "step",
@@ -144,6 +148,7 @@ STEP = Primitive(
     (0.05,),
     places=(1,),
     apart=lambda p: 1.0 + 0.0 * p[1],
+    sharp=True,
 )
 WINDOW = Primitive(
     "window",
@@ -152,6 +157,7 @@ WINDOW = Primitive(
     (0.05, 0.05),
     places=(1, 2),
     apart=lambda p: abs(p[2] - p[1]),
+    sharp=True,
 )
 BUMP = Primitive(
     "bump",
@@ -183,6 +189,7 @@ CURVED_ABOVE = Primitive(
     places=(1,),
     positive=(2,),
     special=ABOVE,
+    apart=lambda p: 1.0 + 0.0 * p[1],
 )
 CURVED_BELOW = Primitive(
     "curved below",
@@ -192,6 +199,7 @@ CURVED_BELOW = Primitive(
     places=(1,),
     positive=(2,),
     special=BELOW,
+    apart=lambda p: 1.0 + 0.0 * p[1],
 )
 DEAD_ZONE = Primitive(
     "dead zone",
@@ -201,6 +209,7 @@ DEAD_ZONE = Primitive(
     places=(1,),
     positive=(2,),
     ends=lambda p: (p[1] - p[2], p[1] + p[2]),
+    apart=lambda p: 2 * abs(p[2]),
 )
 SATURATING = Primitive(
     "saturating",
@@ -256,6 +265,7 @@ HALF_TURN = Primitive(
     (_EVERY,),
     (0.1,),
     apart=lambda p: 0.5 + 0.0 * p[1],
+    sharp=True,
 )
 ARC = Primitive(
     "arc",
@@ -263,6 +273,7 @@ ARC = Primitive(
     (_EVERY, _shares(0.2, 2.9, 19)),
     (0.1, 0.1),
     apart=lambda p: abs(p[2]) / np.pi,
+    sharp=True,
 )
 BUMP_IN_TURN = Primitive(
     "bump in turn",
