@@ -40,7 +40,7 @@ def _found(cost: float, *functions: Free, names=()):
 def test_a_form_is_close_if_it_leaves_little_of_what_the_curve_explains(
     other, error, unchecked_types
 ):
-    found = close_forms(_found(1000.0, CURVE), [other], 1e6, 0.02)
+    found = close_forms(_found(1000.0, CURVE), [other], {"flight velocity": 1e6}, 0.02)
     kept = found.get("force_a")
     assert (kept is None) == (error is None)
     if kept is not None:
@@ -52,6 +52,31 @@ def test_the_best_of_several_forms_is_taken(unchecked_types):
     """The others are given in the order of their scores; a better cost is exact."""
     step = dataclasses.replace(CURVE, primitive=STEP)
     others = [_found(900.0, FORM), _found(1001.0, step)]
-    kept = close_forms(_found(1000.0, CURVE), others, 1e6, 0.02)["force_a"]
+    kept = close_forms(_found(1000.0, CURVE), others, {"flight velocity": 1e6}, 0.02)[
+        "force_a"
+    ]
     assert kept.form is FORM and kept.error == 0.0
     assert kept.percent == 0.01
+
+
+def test_the_error_is_relative_to_the_function_itself(unchecked_types):
+    """Of two functions, one form loses 2 % of the smaller one, but nothing of both."""
+    place = dataclasses.replace(CURVE, family=BY_PLACE, slot="force_b")
+    explained = {"flight velocity": 1e4, "flight position": 1e6}
+    other = _found(1300.0, FORM, place)
+    assert not close_forms(_found(1000.0, CURVE, place), [other], explained, 0.02)
+
+
+def test_a_fit_that_differs_in_two_functions_does_not_count(unchecked_types):
+    """A better curve of one would hide the loss by the form of the other."""
+    place = dataclasses.replace(CURVE, family=BY_PLACE, slot="force_b")
+    of_place = dataclasses.replace(place, primitive=STEP)
+    explained = {"flight velocity": 1e6, "flight position": 1e6}
+    other = _found(990.0, FORM, place)
+    assert not close_forms(_found(1000.0, CURVE, of_place), [other], explained, 0.02)
+
+
+def test_without_an_explained_cost_nothing_is_close(unchecked_types):
+    for explained in ({}, {"flight velocity": 0.0}, {"flight velocity": -5.0}):
+        other = _found(1000.0, FORM)
+        assert not close_forms(_found(1000.0, CURVE), [other], explained, 0.02)

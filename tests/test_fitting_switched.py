@@ -196,6 +196,22 @@ def test_more_events_in_a_piece_than_are_located_are_said(rate, crowded):
         assert "more than 8 switching events" in found.message
 
 
+def test_events_in_data_without_weight_are_not_counted():
+    """The fast switching begins after the part of the recording that is fitted."""
+
+    class Late(Flicker):
+        def switching(self, t, state):
+            return jnp.cos(self.rate * jnp.maximum(t - 1.1, 0.0))
+
+    rng, start = np.random.default_rng(2), jnp.array([0.1, 0.0])
+    run = record(Late(rate=600.0), SENSORS, 2.0, rng=rng, state=start)
+    model = Model(Late(rate=600.0, stiffness=60.5), SENSORS)
+    free = [Parameter("stiffness", lambda m: m.system.stiffness, tolerance=2.0)]
+    problem = Problem.build(model, segment_by_model(model, [run]), free)
+    found = fit(problem, weights=problem.between(0.0, 1.0))
+    assert found.converged
+
+
 @pytest.fixture(scope="module")
 def carts():
     """Two recordings of the cart, and a model of it."""

@@ -39,6 +39,22 @@ def test_a_program_may_be_called_inside_any_transformation():
     assert float(eqx.filter_jit(_cube)(x)) == 8.0
 
 
+@program
+def _applied(function, x):
+    return function(x)
+
+
+def test_a_program_may_be_given_a_function_that_has_captured_a_traced_value():
+    """Such a value is not among the arguments."""
+
+    def product(r):
+        return _applied(lambda x: r * x, jnp.asarray(3.0))
+
+    for derivative in (jax.grad, jax.jacrev, jax.jacfwd):
+        assert float(derivative(product)(2.0)) == 3.0
+    assert float(jax.jit(jax.grad(product))(2.0)) == 3.0
+
+
 def test_tracing_is_known():
     """True inside a program, false in eager derivatives and batches."""
     seen = []

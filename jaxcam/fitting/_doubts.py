@@ -148,11 +148,12 @@ def on_a_bound(problem: Problem, free, point: Point) -> list[str]:
     return found
 
 
-def too_many_events(problem: Problem, point: Point) -> str:
+def too_many_events(problem: Problem, point: Point, weights: Weights | None) -> str:
     """Return a sentence if the fit has ignored switching events, otherwise an empty
     string.
     """
-    crowded = crowded_pieces(problem, point)
+    weights = weights or problem.everything()
+    crowded = crowded_pieces(problem, point) & (np.asarray(weights.flown) > 0)
     if not np.any(crowded):
         return ""
     r, k = np.argwhere(crowded)[0]

@@ -134,7 +134,7 @@ class Fit:
         else:
             far = far_from_data(self.problem, self.costs, self.weights)
             found += [Reason(Doubt.FAR_FROM_DATA, far)] if far else []
-            many = too_many_events(self.problem, self.point)
+            many = too_many_events(self.problem, self.point, self.weights)
             found += [Reason(Doubt.TOO_MANY_EVENTS, many)] if many else []
         bounds = on_a_bound(self.problem, self.free, self.point)
         found += [Reason(Doubt.ON_A_BOUND, one) for one in bounds]

@@ -102,7 +102,7 @@ class DiagramJob(AbstractJob):
             "starts": digest(self.starts),
             "turns": self.turns,
             "keep": keep,
-            "direction": direction,
+            "direction": "up, then down" if direction == "both" else direction,
             "period_tolerance": self.period_tolerance,
         }
         size = self._block(starts) if block is None else block

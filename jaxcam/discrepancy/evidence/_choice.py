@@ -125,6 +125,10 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     options = [one for one in (different, without) if one is not None]
     separate = [one for one in options if _explains(one, best.bic)]
     fewest = min(separate, key=lambda one: one.bic, default=None)
+    if fewest is not None and without is not None and _explains(without, best.bic):
+        # terms that hardly improve the separate values have only imitated them
+        tied = without.bic < fewest.bic + trials.policy.tie
+        fewest = without if tied else fewest
     if fewest is not None and left:
         if missing is None or fewest.bic < missing.score:
             # no function common to the recordings explains as much

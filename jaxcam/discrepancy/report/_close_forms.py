@@ -1,7 +1,7 @@
 """Find parametric forms that almost represent a function which has none."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ...fitting import Fit
@@ -22,25 +22,49 @@ class CloseForm(NamedTuple):
 
 
 def close_forms(
-    missing: Missing, others: Sequence[Missing], explained: float, small: float
+    missing: Missing,
+    others: Sequence[Missing],
+    explained: Mapping[str, float],
+    small: float,
 ) -> dict[str, CloseForm]:
-    """Return, by their slots, the forms closest to functions that have none.
+    """Return, by their slots, the best forms of functions that have none.
 
-    **Arguments:** the functions found; other fits, the best first; the cost that the
-    functions explain; and the fraction of it that a form may leave.
+    **Arguments:** the functions found; other fits, the best first; the cost that each
+    function explains, by its label; and the fraction of it that a form may leave.
     """
     found: dict[str, CloseForm] = {}
     for other in others:
-        left = max(other.fit.cost - missing.fit.cost, 0.0) / explained
-        same = [one.label for one in other.functions] == [
-            one.label for one in missing.functions
-        ]
-        if not (same and other.names == missing.names and left < small):
+        loss = max(other.fit.cost - missing.fit.cost, 0.0)
+        one, form = _only_form(missing, other)
+        if one is None or form is None or one.slot in found:
             continue
-        for one, form in zip(missing.functions, other.functions, strict=True):
-            if isinstance(one, Hidden) or isinstance(form, Hidden):
-                continue
-            if one.smooth and not form.smooth:
-                close = CloseForm(other.fit, form, math.sqrt(left))
-                found.setdefault(one.slot, close)
+        least = explained.get(one.label, 0.0)
+        if loss < small * least:
+            found[one.slot] = CloseForm(other.fit, form, math.sqrt(loss / least))
     return found
+
+
+def _only_form(missing: Missing, other: Missing) -> tuple[Free | None, Free | None]:
+    """Return the only function that differs in another fit, by a form that it has
+    there.
+    """
+    nothing = None, None
+    if other.names != missing.names or len(other.functions) != len(missing.functions):
+        return nothing
+    pairs = [
+        (one, form)
+        for one, form in zip(missing.functions, other.functions, strict=True)
+        if one.label != form.label or _form_of(one) != _form_of(form)
+    ]
+    if len(pairs) != 1:
+        return nothing
+    ((one, form),) = pairs
+    if isinstance(one, Hidden) or isinstance(form, Hidden):
+        return nothing
+    same = one.label == form.label and one.smooth and not form.smooth
+    return (one, form) if same else nothing
+
+
+def _form_of(part: Free | Hidden) -> str | None:
+    form = None if isinstance(part, Hidden) else part.primitive
+    return None if form is None else form.name

@@ -140,7 +140,7 @@ def _of_functions(
     close = close_forms(
         missing,
         [rival.missing for rival in choice.rivals],
-        bare.fit.cost - found.cost,
+        needs.lost,
         policy.small,
     )
     functions = missing_functions(

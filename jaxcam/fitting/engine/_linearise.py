@@ -243,4 +243,9 @@ def total_cost(costs: Costs, extras) -> float:
         (np.minimum(weight, before), costs.joints),
         (rest_weight, costs.rested),
     )
-    return float(sum(np.sum(share * np.asarray(cost)) for share, cost in parts))
+    total = 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for share, cost in parts:
+            # data with zero weight have no cost, also if they are not finite
+            total += np.sum(np.where(share > 0, share * np.asarray(cost), 0.0))
+    return float(total)

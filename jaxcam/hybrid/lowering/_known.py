@@ -33,6 +33,10 @@ _NUMPY = {
 }
 
 
+# maximum number of cases of `numpy.choose`, the selector included
+_CASES = 32
+
+
 FOLDED = frozenset(_NUMPY)
 """Operations on known scalars that `folded` computes."""
 
@@ -66,8 +70,8 @@ def computed(equation, arrays) -> list[np.ndarray]:
             made = arrays
         elif name == "reduce_sum":
             made = [np.sum(arrays[0], axis=tuple(params["axes"]))]
-        elif name == "select_n":
-            made = [np.choose(arrays[0].astype(int), arrays[1:])]
+        elif name == "select_n" and len(arrays) <= _CASES:
+            made = [np.choose(arrays[0].astype(int), arrays[1:], mode="clip")]
         elif name == "iota":
             made = [np.indices(params["shape"])[params["dimension"]]]
         else:
