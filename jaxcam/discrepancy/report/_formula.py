@@ -47,7 +47,7 @@ _WORDS = {
     "bump": "acts only around {x} {a}, over about {width}",
     "square": "grows with the square of the {x}, measured from {middle}",
     "cube": "grows with the cube of the {x}, measured from {middle}",
-    "exponential": "grows exponentially with the {x}, by a factor e over {reach}",
+    "exponential": "{trend} exponentially with the {x}, by a factor e over {span}",
     "power": "grows as the {x} to the power {power}",
     "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
     "forward": "acts only while the {x} is positive",
@@ -106,7 +106,7 @@ def formula_of(
         text = f"exp({text})"
     says = _WORDS[primitive.name].format(**values)
     if kind == "restitution" and numbers[0] < 0:
-        says = says.replace("grows", "falls")
+        says = says.replace("grows", "falls").replace("decays", "recovers")
     words = f"{thing} that {says}: {text}"
     return text, words + _mechanism(family, primitive, numbers, values)
 
@@ -134,6 +134,7 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
         "edge": first * width,
         "half_range": width / 2,
         "reach": width / first if first else math.inf,
+        "span": width / abs(first) if first else math.inf,
         "decay": abs(first) * width,
         "wavenumber": 2 * math.pi * first / width,
         "wavelength": width / first if first else math.inf,
@@ -142,7 +143,8 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
         "rim": math.cos(second),
         "half": abs(second),
     }
-    return {name: f"{value:.4g}" for name, value in shown.items()} | {"x": x}
+    words = {"x": x, "trend": "decays" if first < 0 else "grows"}
+    return {name: f"{value:.4g}" for name, value in shown.items()} | words
 
 
 def _mechanism(family: Family, primitive: Primitive, numbers, values) -> str:
