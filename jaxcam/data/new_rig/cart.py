@@ -48,9 +48,11 @@ class Cart(HybridSystem):
         after_right = jnp.stack([position, -self.restitution_right * velocity])
         return jnp.stack([after_left, after_right])
 
-    # A driven system has two fields for its drive, `speed: float` (rad/s) and `phase:
-    # float` (rad). It uses `self.speed * t + self.phase` as the angle of the drive and
-    # defines its period:
+    # If the drive has an encoder, the system has two fields for it, `speed: float`
+    # (rad/s) and `phase: float` (rad), and uses `self.speed * t + self.phase` as the
+    # angle of the drive. If only the frequency of each recording is known, a field of
+    # any name holds it; give its values under [records] in the rig file. In both cases,
+    # the system defines its period:
     #
     # @property
     # def period(self):
