@@ -9,6 +9,12 @@ from ._program import correct, Corrected, evaluate
 from .problem import AbstractProblem
 
 
+# number of steps that are shortened because the parameter turns back
+_TURNED = 12
+# component of a tangent of length one along the parameter whose sign is certain
+_SIDEWAYS = 1e-3
+
+
 def solved_start(
     problem: AbstractProblem, context: Context, z: np.ndarray, name: str, direction: int
 ) -> Corrected:
@@ -45,6 +51,9 @@ def leave(
 ) -> tuple[Corrected, float]:
     """Return the first point of a branch that leaves z along a tangent, and its
     distance, at most `step`.
+
+    The step is shortened if the parameter turns back within it, because no test
+    function is known at z that would show the fold there.
     """
     settings = context.settings
     zero = np.zeros_like(z)
@@ -52,7 +61,8 @@ def leave(
     tangent = np.asarray(tangent, float)
     tangent = tangent / np.linalg.norm(tangent / scale)
     low, high = context.bounds
-    while step >= settings.min_step:
+    turned: list[tuple[Corrected, float]] = []
+    while step >= settings.min_step and len(turned) < _TURNED:
         guess = z + step * tangent
         at = correct(problem, context, guess, tangent / scale**2, tangent)
         moved = np.linalg.norm((at.z - guess) / scale)
@@ -60,8 +70,15 @@ def leave(
             # the tangent has changed direction since the start: continue outwards
             outwards = evaluate(problem, context, at.z, at.z - z)
             if np.all(np.isfinite(outwards.tangent)):
-                return outwards, step
+                onwards = [at.z[-1] - z[-1]]
+                if abs(tangent[-1]) > _SIDEWAYS * scale[-1]:
+                    onwards.append(tangent[-1])
+                if all(one * outwards.tangent[-1] >= 0 for one in onwards):
+                    return outwards, step
+                turned.append((outwards, step))
         step /= 2
+    if turned:
+        return turned[0]
     raise ValueError(
         "no branch leaves the start along the given tangent; start from a regular "
         "point, or use switch at a special point"

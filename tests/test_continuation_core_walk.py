@@ -246,3 +246,16 @@ def test_bad_settings():
             BranchSettings(**wrong)
     with pytest.raises(ValueError, match="period"):
         continuation.FixedPoint(logistic, {"mu": 2.0}, period=0)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.5])
+def test_a_fold_just_behind_the_start_is_not_stepped_over(step):
+    """p = u - 10 u^2 from u = 0 along its tangent: the fold is at u = 0.05."""
+    problem = continuation.Equilibrium(lambda u, p: p["a"] - u + 10 * u**2, {"a": 0.0})
+    start = continuation.Start(
+        problem, np.zeros(1), 0.0, np.array([1.0, 1.0]), step=step
+    )
+    found = continuation.branch(problem, start, "a", (-1.0, 1.0))
+    (fold,) = found.of_kind("fold")
+    assert fold.parameter == pytest.approx(0.025, abs=1e-9)
+    assert fold.state[0] == pytest.approx(0.05, abs=1e-6)
