@@ -1,6 +1,7 @@
 """The bifurcation figure says what the branch says."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import matplotlib
 
@@ -13,6 +14,7 @@ import pytest
 
 from continuation import Branch, Point
 from jaxcam import plotting
+from jaxcam.plotting._branch import _solid
 
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -81,3 +83,18 @@ def test_the_name_of_a_mark_at_an_edge_is_written_inwards(side, expected):
     (text,) = figure.axes[0].texts
     assert text.get_ha() == expected
     plt.close(figure)
+
+
+def test_a_point_of_unknown_stability_belongs_to_the_line_beside_it():
+    """Between unstable points and a change of the problem: not a solid stub."""
+    kinds = [
+        ("5 impacts", True),
+        ("5 impacts", None),
+        ("5 impacts", False),
+        ("5 impacts", None),
+        ("6 impacts", None),
+        ("6 impacts", False),
+        ("7 impacts", None),
+    ]
+    points = [SimpleNamespace(signature=s, stable=stable) for s, stable in kinds]
+    assert _solid(points) == [True, True, False, False, False, False, True]

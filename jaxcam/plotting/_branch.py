@@ -122,8 +122,9 @@ def _draw(ax: Axes, branch, value, x_scale) -> None:
     """
     points = [p for p in branch.points if p.converged]
     before = None
-    for (_, stable), run in groupby(points, key=lambda p: (p.signature, _solid(p))):
-        run = list(run)
+    kinds = [(p.signature, solid) for p, solid in zip(points, _solid(points))]
+    for (_, stable), group in groupby(zip(kinds, points), key=lambda one: one[0]):
+        run = [point for _, point in group]
         rows = [np.atleast_1d(np.asarray(value(p), dtype=float)) for p in run]
         width = len(rows[0])
         # the lines of neighbouring sequences meet
@@ -143,8 +144,19 @@ def _draw(ax: Axes, branch, value, x_scale) -> None:
             )
 
 
-def _solid(point) -> bool:
-    return point.stable is None or bool(point.stable)
+def _solid(points) -> list[bool]:
+    """Return which points belong to a solid line.
+
+    A point of unknown stability, such as a grazing orbit, belongs to the line of its
+    neighbours with the same signature.
+    """
+    found = [None if p.stable is None else bool(p.stable) for p in points]
+    for order in (range(1, len(points)), range(len(points) - 2, -1, -1)):
+        for k in order:
+            near = k - 1 if order.step > 0 else k + 1
+            if found[k] is None and points[k].signature == points[near].signature:
+                found[k] = found[near]
+    return [one is None or one for one in found]
 
 
 def _mark(ax: Axes, branch, value, x_scale) -> None:
