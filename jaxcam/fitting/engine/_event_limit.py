@@ -37,7 +37,11 @@ def _crowded(layout: Layout, pieces: Pieces, point: Point):
 
     def record(values, *inputs):
         model = layout.at(values)
-        return jax.vmap(lambda *one: has_more_events(model, *one, substeps))(*inputs)
+
+        def crowded(state, start, step, drive):
+            return has_more_events(model, state, start, step, drive, substeps)
+
+        return jax.vmap(crowded)(*inputs)
 
     times = pieces.flown.start, pieces.flown.step
     return jax.vmap(record)(point.values, point.states, *times, pieces.drive)
