@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from jaxcam.cli import write_report
 from jaxcam.cli._diagnosis_figures import _shapes, draw, unit_along
 from jaxcam.cli._diagnosis_page import diagnosis_page
 from jaxcam.cli._output import to_text
@@ -159,3 +160,15 @@ def test_every_shape_has_a_quantity_whose_unit_is_known():
         Variable.PHASE: "rad",
         Variable.TIME: "s",
     }
+
+
+def test_a_report_is_written_from_python(tmp_path, monkeypatch, unchecked_types):
+    """By the function of the command, into a folder given as text."""
+    written = []
+    monkeypatch.setattr(
+        "jaxcam.cli._diagnose_files.write_diagnosis",
+        lambda folder, found, notes: written.append((folder, found, notes)),
+    )
+    page = write_report("a diagnosis", str(tmp_path / "report"))  # pyright: ignore
+    assert page == tmp_path / "report" / "index.html"
+    assert written == [(tmp_path / "report", "a diagnosis", ())]
