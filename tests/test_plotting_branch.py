@@ -86,7 +86,7 @@ def test_the_name_of_a_mark_at_an_edge_is_written_inwards(side, expected):
 
 
 def test_a_point_of_unknown_stability_belongs_to_the_line_beside_it():
-    """Between unstable points and a change of the problem: not a solid stub."""
+    """Between unstable points and a change of the problem, the line is dashed."""
     kinds = [
         ("5 impacts", True),
         ("5 impacts", None),

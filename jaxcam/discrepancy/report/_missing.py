@@ -64,7 +64,7 @@ class MissingFunction:
       `(n,)` or `(n, m)`.
     - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
-    - `nearly`: otherwise the formula of the closest form, if it is close.
+    - `nearly`: otherwise the formula of the best form, if it is close.
     - `element`: for a force with an internal state, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
     - `gap`: for an effect at impacts or of the surface, the name of the gap if there

@@ -213,14 +213,9 @@ def cost_by_recording(costs: Costs, weights) -> Float[np.ndarray, " r"]:
     Returns:
         The costs, shape `(r,)`.
     """
-    before = np.concatenate([weights.flown[:, :1], weights.flown[:, :-1]], axis=1)
-    parts = (
-        (weights.flown, costs.flown),
-        (np.minimum(weights.flown, before), costs.joints),
-        (weights.rested, np.nan_to_num(costs.rested)),
-    )
     total = np.zeros(len(weights.flown))
-    for weight, cost in parts:
+    found = costs._replace(rested=np.nan_to_num(costs.rested))
+    for weight, cost in _weighted(weights.flown, weights.rested, found):
         total += np.sum(weight * np.where(weight > 0, cost, 0.0), axis=1)
     return total
 
@@ -236,16 +231,17 @@ def total_cost(costs: Costs, extras) -> float:
     Returns:
         The cost.
     """
-    weight, rest_weight = np.asarray(extras.weight), np.asarray(extras.rest_weight)
-    before = np.concatenate([weight[:, :1], weight[:, :-1]], axis=1)
-    parts = (
-        (weight, costs.flown),
-        (np.minimum(weight, before), costs.joints),
-        (rest_weight, costs.rested),
-    )
     total = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
-        for share, cost in parts:
+        for weight, cost in _weighted(extras.weight, extras.rest_weight, costs):
             # data with zero weight have no cost, also if they are not finite
-            total += np.sum(np.where(share > 0, share * np.asarray(cost), 0.0))
+            total += np.sum(np.where(weight > 0, weight * cost, 0.0))
     return float(total)
+
+
+def _weighted(flown, rested, costs: Costs) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return weights and costs of flights, joints and contacts."""
+    flown, rested = np.asarray(flown), np.asarray(rested)
+    before = np.concatenate([flown[:, :1], flown[:, :-1]], axis=1)
+    shares = flown, np.minimum(flown, before), rested
+    return list(zip(shares, map(np.asarray, costs), strict=True))
