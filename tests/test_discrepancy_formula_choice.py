@@ -27,22 +27,39 @@ def _trial(score, cost=1000.0):
 @pytest.fixture
 def chosen(monkeypatch, unchecked_types):
     """The form that is kept, and those that were fitted, for predicted gains and
-    scores; the curve has a score of 1000."""
+    scores of forms and of sums of them; the curve has a score of 1000."""
 
-    def choose(forms):
+    def choose(forms, sums=(), gain=0.0):
         tried = []
         curve = _trial(1000.0)
-        ranked = [(gain, name, None) for name, (gain, _) in forms.items() if gain]
+        sums = dict(sums)
+        scores = {name: score for name, (_, score) in (forms | sums).items()}
 
-        def fitted(fits, found, apart, one, primitive, numbers, small):
+        def ranked(forms):
+            return [
+                _formulas.Start(gain, name, None)
+                for name, (gain, _) in forms.items()
+                if gain
+            ]
+
+        def fitted(fits, found, apart, one, start, small):
+            _, primitive, numbers = start
             tried.append(primitive.name)
             if primitive.special is None and numbers is not None:
                 # the special case starts from the fitted numbers but the last
                 assert numbers.tolist() == [0.0, 1.0]
-            score = forms[primitive][1]
+            score = scores[primitive]
             return None if score is None else _trial(score)
 
-        monkeypatch.setattr(_formulas, "_promising", lambda *_: ranked)
+        likelihood = types.SimpleNamespace(gain=gain)
+        monkeypatch.setattr(
+            _formulas,
+            "CurveLikelihood",
+            types.SimpleNamespace(about=lambda *_: likelihood),
+        )
+        monkeypatch.setattr(_formulas, "promising", lambda *_: ranked(forms))
+        search = types.SimpleNamespace(promising=lambda _: ranked(sums))
+        monkeypatch.setattr(_formulas, "SumSearch", lambda _: search)
         monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
         monkeypatch.setattr(_formulas, "_fitted", fitted)
         fits = types.SimpleNamespace(policy=Policy())
@@ -97,3 +114,22 @@ def test_a_form_is_fitted_once(chosen):
     power.special = line
     forms = {power: (80.0, 970.0), line: (79.0, 930.0)}
     assert chosen(forms)[1] == ["power", "line"]
+
+
+def test_a_sum_is_fitted_if_no_form_alone_is_kept(chosen):
+    """The curve has a gain of 5000 and a cost of 1000; its score is 1000."""
+    wave, both = Form("wave"), Form("wave + wave")
+    sums = {both: (4990.0, 960.0)}
+    score, tried = chosen({wave: (40.0, 1011.0)}, sums, gain=5000.0)
+    assert tried == ["wave", "wave + wave"] and score == 960.0
+    score, tried = chosen({wave: (40.0, 1009.0)}, sums, gain=5000.0)
+    assert tried == ["wave"] and score == 1009.0
+
+
+def test_a_sum_that_promises_less_than_the_curve_is_not_fitted(chosen):
+    """By more than the 60 that are allowed for an inaccurate prediction."""
+    wave, both = Form("wave"), Form("wave + wave")
+    for gain, fitted in ((4935.0, 1), (4945.0, 2)):
+        sums = {both: (gain, 960.0)}
+        _, tried = chosen({wave: (40.0, None)}, sums, gain=5000.0)
+        assert len(tried) == fitted

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxcam.discrepancy.report import formula_of
-from jaxcam.discrepancy.terms import Factor, Family, FREE, Variable, Where
+from jaxcam.discrepancy.terms import Factor, Family, FREE, sum_of, Variable, Where
 
 
 LOW, HIGH, SLIP = -0.4, 1.1, 1e-3
@@ -42,6 +42,11 @@ NUMBERS = {
     "bump in turn": (0.6, 3.7, 0.25),
 }
 
+SUMS = {
+    Variable.POSITION: [("above", "bump"), ("window", "straight", "dead zone")],
+    Variable.VELOCITY: [("forward", "cube"), ("falling", "power of speed")],
+    Variable.PHASE: [("harmonic 1", "harmonic 3"), ("arc", "harmonic 2", "half turn")],
+}
 ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
 
 
@@ -58,6 +63,10 @@ def _forms():
         family = _family(argument)
         for primitive in family.primitives:
             yield pytest.param(family, primitive, id=f"{argument} {primitive.name}")
+        forms = {one.name: one for one in family.primitives}
+        for names in SUMS.get(argument, ()):
+            both = sum_of([forms[name] for name in names], [1.0] * len(names))
+            yield pytest.param(family, both, id=f"{argument} {both.name}")
 
 
 def _wrapped(x):
@@ -68,7 +77,8 @@ def _wrapped(x):
 def test_the_formula_is_the_function_that_was_fitted(family, primitive):
     """To 0.2 % of its size in 85 % of the range: an edge is smooth over 3 % of it on
     either side to this accuracy, that of a formula is sharp."""
-    numbers = np.array(NUMBERS[primitive.name])
+    parts = primitive.parts or (primitive,)
+    numbers = np.concatenate([NUMBERS[part.name] for part in parts])
     coefficients = np.zeros(21)
     coefficients[: len(numbers)] = numbers
     term = FREE[Where.FLIGHT].of(family, "a", coefficients, primitive).prepared()

@@ -94,9 +94,21 @@ def formula_of(
     **Arguments:** its family and form, the parameters of the form, and its kind
     (`"force"`, `"restitution"`, `"surface"` or `"sensor"`).
     """
-    values = _values(family, numbers)
-    text = _FORMULAS[primitive.name].format(**values)
+    texts, sentences, mechanism = [], [], ""
+    for part, own in primitive.divided(numbers):
+        values = _values(family, own)
+        texts.append(_FORMULAS[part.name].format(**values))
+        sentence = _WORDS[part.name].format(**values)
+        if kind == "restitution" and own[0] < 0:
+            sentence = sentence.replace("grows", "falls").replace("decays", "recovers")
+        sentences.append(sentence)
+        if not primitive.parts:
+            mechanism = _mechanism(family, part, own, values)
+    text = " + ".join(texts).replace("+ -", "- ")
+    says = " and also ".join(sentences)
     thing = _THINGS[kind]
+    if primitive.parts and family.factor is not Factor.ONE:
+        text = f"({text})"
     if family.factor is Factor.DEFLECTION:
         text, thing = f"{text}*(position - {family.middle:.4g})", "a stiffness"
     elif family.factor is not Factor.ONE:
@@ -104,11 +116,7 @@ def formula_of(
         text = f"{text}*{factor}"
     elif kind == "restitution":
         text = f"exp({text})"
-    says = _WORDS[primitive.name].format(**values)
-    if kind == "restitution" and numbers[0] < 0:
-        says = says.replace("grows", "falls").replace("decays", "recovers")
-    words = f"{thing} that {says}: {text}"
-    return text, words + _mechanism(family, primitive, numbers, values)
+    return text, f"{thing} that {says}: {text}{mechanism}"
 
 
 def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:

@@ -5,22 +5,18 @@ trajectories decides whether the form is kept.
 """
 
 import dataclasses
-import itertools
 import math
 
 import numpy as np
 
 from ...fitting import Problem
-from ..terms import Family, free_basis, Place, Primitive
+from ._curve_likelihood import CurveLikelihood, promising, Start
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._hidden_state import Hidden
 from ._leads import shows_apart
-from ._roughness import beside, Roughness
+from ._roughness import Roughness
 from ._slots import emptied, Free, replaced
-
-
-# Number of points at which a form is compared with the sines that represent it
-_GRID = 400
+from ._sums_of_forms import SumSearch
 
 
 def formulated(
@@ -39,44 +35,82 @@ def formulated(
         one = _in_slot(found, slot)
         if isinstance(one, Hidden) or not one.smooth:
             continue
-        sound = _tried(fits, found, apart, one, small, progress)
-        tried += sound
-        best = min(sound, key=lambda trial: trial.score, default=found)
-        if best.score < found.score + fits.policy.form_loss:
-            found = best
+        likelihood = CurveLikelihood.about(fits, found, one)
+        trials = _Trials(fits, found, apart, one, small, progress)
+        trials.run(promising(likelihood, fits.policy.followed))
+        if trials.kept is None:
+            sums = SumSearch(likelihood).promising(fits.policy.followed)
+            trials.run([start for start in sums if trials.may_do(start, likelihood)])
+        tried += trials.sound
+        found = trials.kept or found
     return found, tried
 
 
-def _tried(
-    fits: FreeFits, found: Missing, apart: Problem, one: Free, small: float, progress
-) -> list[Missing]:
-    """Fit the promising forms of a function; return the fits that make sense.
+class _Trials:
+    """Fits of forms in place of one of the functions of a fit.
 
-    A form with an exponent is followed by its special case for an exponent of one,
-    which has one parameter less.
+    `sound`: the fits with finite evidence and parameters that make sense.
     """
-    sound: list[Missing] = []
-    waiting, done, least = _promising(fits, found, one), set(), -math.inf
-    while waiting:
-        gain, primitive, numbers = waiting.pop(0)
-        if gain < least:
-            break
-        if primitive.name in done:
-            continue
-        done.add(primitive.name)
-        progress(f"fitting a formula: {primitive.name}", None)
-        trial = _fitted(fits, found, apart, one, primitive, numbers, small)
-        if trial is None or not _sound(trial, one):
-            continue
-        sound.append(trial)
-        if trial.score < found.score:
-            # only a form that promises as much may have more evidence
-            least = max(least, gain - fits.policy.leads)
-        if primitive.special is not None:
-            names = _in_slot(trial, one.slot).coefficients[:-1]
-            start = np.array([trial.fit[name].value for name in names])
-            waiting.insert(0, (gain, primitive.special, start))
-    return sound
+
+    def __init__(
+        self,
+        fits: FreeFits,
+        found: Missing,
+        apart: Problem,
+        one: Free,
+        small: float,
+        progress,
+    ):
+        self.fits, self.found, self.apart = fits, found, apart
+        self.one, self.small, self.progress = one, small, progress
+        self.sound: list[Missing] = []
+
+    @property
+    def kept(self) -> Missing | None:
+        """Return the fit with the most evidence, if that is about as much as the
+        function has.
+        """
+        best = min(self.sound, key=lambda trial: trial.score, default=self.found)
+        allowed = self.found.score + self.fits.policy.form_loss
+        return best if self.sound and best.score < allowed else None
+
+    def run(self, waiting: list[Start]) -> None:
+        """Fit forms in turn, until the next cannot have more evidence.
+
+        A form with an exponent is followed by its special case for an exponent of one,
+        which has one parameter less.
+        """
+        waiting, done, least = list(waiting), set(), -math.inf
+        while waiting:
+            start = waiting.pop(0)
+            gain, form, _ = start
+            if gain < least:
+                break
+            if form.name in done:
+                continue
+            done.add(form.name)
+            self.progress(f"fitting a formula: {form.name}", None)
+            trial = _fitted(
+                self.fits, self.found, self.apart, self.one, start, self.small
+            )
+            if trial is None or not _sound(trial, self.one):
+                continue
+            self.sound.append(trial)
+            if trial.score < self.found.score:
+                # only a form that promises as much may have more evidence
+                least = max(least, gain - self.fits.policy.leads)
+            if form.special is not None:
+                names = _in_slot(trial, self.one.slot).coefficients[:-1]
+                numbers = np.array([trial.fit[name].value for name in names])
+                waiting.insert(0, Start(gain, form.special, numbers))
+
+    def may_do(self, start: Start, likelihood: CurveLikelihood) -> bool:
+        """Return whether a form is expected to have about as much evidence as the
+        function.
+        """
+        worse = heat_of(self.found.fit) * (likelihood.gain - start.gain)
+        allowed = self.fits.policy.form_loss + self.fits.policy.leads
+        return self.found.fit.cost + worse < self.found.score + allowed
 
 
 def _in_slot(found: Missing, slot: str):
@@ -108,18 +142,17 @@ def _fitted(
     found: Missing,
     apart: Problem,
     one: Free,
-    primitive: Primitive,
-    numbers,
+    start: Start,
     small: float,
 ) -> Missing | None:
-    """Fit a form in place of a function, starting from given parameters.
+    """Fit a form in place of a function.
 
     **Returns:** the fit, or `None` if the form does not even explain individual
     pieces.
     """
-    problem = found.problem
+    problem, numbers = found.problem, start.numbers
     size = Roughness(size=abs(float(numbers[0])))
-    form = dataclasses.replace(one, primitive=primitive, roughness=size)
+    form = dataclasses.replace(one, primitive=start.primitive, roughness=size)
     functions = tuple(form if f.slot == one.slot else f for f in found.functions)
     values = emptied(problem, found.fit.point.values, one.slot)
     columns = [problem.names.index(name) for name in form.coefficients]
@@ -136,52 +169,3 @@ def _fitted(
     subset = Subset(problem, functions, found.names)
     trial = fits.fitted(subset, point, beaten=beaten)
     return trial if trial.fit.cost < beaten else None
-
-
-def _promising(
-    fits: FreeFits, found: Missing, one: Free
-) -> list[tuple[float, Primitive, np.ndarray]]:
-    """Return the forms most similar to a function where the data determine it: their
-    predicted gain and their parameters.
-
-    This uses the quadratic likelihood about the fit, in which a form with size s and
-    sines b has the cost of the coefficients `s b`.
-    """
-    heat, labels = heat_of(found.fit), one.coefficients
-    subset = Subset(found.problem, found.functions, found.names)
-    quadratic = fits.quadratic(subset, found.fit.point, heat, one)
-    inside, pull = beside(*quadratic, fits.policy.alike)
-    columns = [found.problem.names.index(name) for name in labels]
-    value = np.asarray(found.fit.point.values)[0, columns]
-    slope = inside @ value + pull
-    price = math.log(found.problem.samples)
-    ranked = []
-    for primitive in one.family.primitives:
-        starts = np.array(list(itertools.product(*primitive.starts)))
-        starts = starts.reshape(len(starts), primitive.count - 1)
-        sines = _sines_of(one.family, primitive, starts, len(labels))
-        told = sines @ slope
-        seen = np.einsum("ka,ab,kb->k", sines, inside, sines)
-        seen = np.where(seen > 0, seen, np.inf)
-        gains = told**2 / seen
-        k = int(np.argmax(gains))
-        size = told[k] / seen[k]
-        if size != 0:
-            numbers = np.array([size, *starts[k]])
-            ranked.append((gains[k] - primitive.count * price, primitive, numbers))
-    ranked.sort(key=lambda each: -each[0])
-    return ranked[: fits.policy.followed]
-
-
-def _sines_of(family: Family, primitive: Primitive, starts, count: int) -> np.ndarray:
-    """Return the coefficients `(k, count)` of the sums of sines nearest to forms of
-    size one.
-    """
-    along = np.linspace(family.low, family.high, _GRID)
-    basis = free_basis(family, along, count)
-    direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
-    place = Place.between(along[None], family.low, family.high)
-    numbers = [np.ones((len(starts), 1)), *starts.T[:, :, None]]
-    values = primitive.value(place, numbers, direction[None])
-    values = np.broadcast_to(values, (len(starts), _GRID))
-    return np.linalg.lstsq(basis, values.T, rcond=1e-6)[0].T

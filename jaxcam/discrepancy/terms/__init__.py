@@ -36,7 +36,12 @@ from ._location import (
     other_locations as other_locations,
 )
 from ._motion_scales import MotionScales as MotionScales
-from ._primitives import Place as Place, Primitive as Primitive
+from ._primitives import (
+    MOST_PARTS as MOST_PARTS,
+    Place as Place,
+    Primitive as Primitive,
+    sum_of as sum_of,
+)
 from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import (
     more_faults as more_faults,

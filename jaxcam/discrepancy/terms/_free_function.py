@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float
 
 from ...fitting import Parameter
 from ._families import Factor, Family
-from ._primitives import Place, Primitive, PRIMITIVES
+from ._primitives import MOST_NUMBERS, MOST_PARTS, Place, Primitive, PRIMITIVES
 from ._shapes import Variable
 from ._term import Motion, Term, terms_of
 from ._where import Where
@@ -31,8 +31,15 @@ _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIM
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
 
 
-def _number(value) -> Array:
-    return jnp.asarray(value, dtype=float)
+def _array(values) -> Array:
+    return jnp.asarray(values, dtype=float)
+
+
+def _indices(form: Primitive | None) -> tuple[float, ...]:
+    """Return the indices of the parts of a form, counted from one, or zeros."""
+    parts = () if form is None else form.parts or (form,)
+    found = [1.0 + PRIMITIVES.index(part) for part in parts]
+    return (*found, *[0.0] * (MOST_PARTS - len(found)))
 
 
 def _numbers(values) -> tuple[Array, ...]:
@@ -59,7 +66,7 @@ def _knots(low, high):
 
 # compiled by themselves, so that they are traced once for all functions of a program
 @jax.jit
-def _splines(numbers, number, waves, ends, jumping, stride):
+def _splines(numbers, forms, waves, ends, jumping, stride):
     """Return the coefficients of the spline, those for its derivatives if they differ
     (otherwise `None`), and the jump.
     """
@@ -71,24 +78,40 @@ def _splines(numbers, number, waves, ends, jumping, stride):
     def sines():
         each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(rates * spacing))
         phases = jnp.outer(knots, rates) + shifts[None]
-        return both(jnp.sin(phases) @ each), jumping * numbers[-1]
+        return jnp.sin(phases) @ each, jnp.zeros(()), jumping * numbers[-1]
 
-    def of(one: Primitive):
+    def nothing():
+        return jnp.zeros(_KNOTS), jnp.zeros(()), jnp.zeros(())
+
+    def of(one: Primitive, own):
         def form():
-            table = one.function(place, numbers)
-            return both(table, one.apart), one.jump * numbers[0]
+            apart = _array(0.0 if one.apart is None else one.apart(own))
+            return one.function(place, own), apart, one.jump * own[0]
 
         return form
 
-    def both(table, apart=None):
-        if stride is None:
-            return table, None
-        if apart is None:
-            return table, table
-        reach = jnp.minimum(stride, apart(numbers) * (high - low))
-        return table, _shares(knots, reach) @ table
+    table, softened, jump = nothing()[0], nothing()[0], jnp.zeros(())
+    for k, own in enumerate(_divided(numbers, forms)):
+        empty = nothing if k else sines
+        options = [empty, *(of(one, own) for one in PRIMITIVES)]
+        part, apart, change = jax.lax.switch(forms[k].astype(int), options)
+        table, jump = table + part, jump + change
+        if stride is not None:
+            reach = jnp.minimum(stride, apart * (high - low))
+            softened += _shares(knots, reach) @ part
+    return (table, None if stride is None else softened), jump
 
-    return jax.lax.switch(number, [sines, *map(of, PRIMITIVES)])
+
+def _divided(numbers, forms):
+    """Return the parameters of each of several forms, those of one after another."""
+    counts = jnp.array([0, *(one.count for one in PRIMITIVES)])
+    every = jnp.pad(jnp.stack(numbers), (0, MOST_NUMBERS))
+    first, divided = jnp.asarray(0), []
+    for form in forms:
+        own = jax.lax.dynamic_slice(every, (first,), (MOST_NUMBERS,))
+        divided.append(tuple(own[k] for k in range(MOST_NUMBERS)))
+        first = first + counts[form.astype(int)]
+    return divided
 
 
 @jax.jit
@@ -113,9 +136,10 @@ def _interpolated(tables, place):
 class FreeFunction(Term):
     """A function of any family, selected by the values of its arrays.
 
-    It is a sum of sines, or the form number `form - 1` in `PRIMITIVES`, whose
-    parameters are then the first coefficients. All functions of one class share one
-    compiled program.
+    It is a sum of sines if the first of `forms` is zero. Otherwise it is the sum of the
+    forms that have these numbers in `PRIMITIVES`, counted from one, and the first
+    coefficients are their parameters. All functions of one class share one compiled
+    program.
 
     **Arguments:** `label` of the parameters; `coefficients` of the sines and of a jump;
     `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
@@ -138,8 +162,8 @@ class FreeFunction(Term):
     slip: Float[Array, ""]
     jumping: Float[Array, ""]
     periodic: Bool[Array, ""]
-    form: Float[Array, ""] = eqx.field(default=0.0, converter=_number)
-    odd: Float[Array, ""] = eqx.field(default=0.0, converter=_number)
+    forms: Float[Array, " m"] = eqx.field(default=(0.0,) * MOST_PARTS, converter=_array)
+    odd: Float[Array, ""] = eqx.field(default=0.0, converter=_array)
     stride: Float[Array, ""] | None = None
     table: Float[Array, " n"] | None = None
     softened: Float[Array, " n"] | None = None
@@ -158,7 +182,7 @@ class FreeFunction(Term):
         """
         tables, jump = _splines(
             self.coefficients,
-            self.form.astype(int),
+            self.forms,
             (self.rates, self.shifts),
             (self.low, self.high),
             self.jumping,
@@ -219,7 +243,7 @@ class FreeFunction(Term):
             jumping=jnp.asarray(float(family.jumps)),
             motion_unit=family.motion_unit,
             constraint=family.constraint,
-            form=0.0 if primitive is None else 1.0 + PRIMITIVES.index(primitive),
+            forms=_indices(primitive),
             odd=float(primitive is not None and primitive.odd),
         )
 
@@ -241,7 +265,7 @@ class FreeFunction(Term):
         assert self.table is not None
         width = self.high - self.low
         start, spacing = _knots(self.low, self.high)
-        more = jnp.where(self.form > 0, _BEYOND * width, 0.0)
+        more = jnp.where(self.forms[0] > 0, _BEYOND * width, 0.0)
         inside = argument - self.low
         within = jnp.clip(inside, -more, width + more)
         inside = jnp.where(self.periodic, inside % width, within)

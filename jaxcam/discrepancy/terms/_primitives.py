@@ -5,12 +5,14 @@ visited; its first parameter is its size. Edges are smoothed over a hundredth of
 range, so that a fit can move them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 
+MOST_PARTS = 3
+"""Largest number of forms in a sum."""
 _EDGE = 0.01
 # Smallest argument of a power, as a fraction of the range, so that its derivatives
 # exist
@@ -56,6 +58,7 @@ class Primitive(NamedTuple):
         as a fraction of the range, as a function of the parameters.
     - `sharp`: whether its value jumps there.
     - `special`: the form that it is for an exponent of one, its last parameter.
+    - `parts`: the forms of which it is the sum, if it is one.
     """
 
     name: str
@@ -70,11 +73,24 @@ class Primitive(NamedTuple):
     apart: Callable | None = None
     special: Any = None
     sharp: bool = False
+    parts: tuple[Any, ...] = ()
+
+    def divided(self, numbers) -> "list[tuple[Primitive, Any]]":
+        """Return the parts of a sum with their own parameters, or the form itself with
+        all of them.
+        """
+        divided, first = [], 0
+        for part in self.parts or (self,):
+            divided.append((part, numbers[first : first + part.count]))
+            first += part.count
+        return divided
 
     def within(self, numbers) -> bool:
         """Return whether the positions lie in the range of the argument, in their
         order, and lengths and exponents are positive.
         """
+        if self.parts:
+            return all(part.within(own) for part, own in self.divided(numbers))
         numbers = [float(number) for number in numbers]
         places = [numbers[k] for k in self.places]
         every = [*places, *(self.ends(numbers) if self.ends else ())]
@@ -86,15 +102,39 @@ class Primitive(NamedTuple):
 
     @property
     def count(self) -> int:
+        if self.parts:
+            return sum(part.count for part in self.parts)
         return 1 + len(self.starts)
 
     def value(self, place: Place, numbers, direction):
         """Return the complete form, including the jump if the motion has a
         direction.
         """
+        if self.parts:
+            divided = self.divided(numbers)
+            return sum(part.value(place, own, direction) for part, own in divided)
         smooth = self.function(place, numbers)
         turned = smooth * direction if self.odd else smooth
         return turned + self.jump * numbers[0] * direction
+
+
+def sum_of(parts: Sequence[Primitive], sizes: Sequence[float]) -> Primitive:
+    """Return the sum of forms, whose parameters are those of its parts in their order.
+
+    **Arguments:** at most `MOST_PARTS` forms, and their approximate sizes.
+    """
+    scales: list[float] = []
+    for part, size in zip(parts, sizes, strict=True):
+        scales += [abs(size), *part.scales]
+
+    return Primitive(
+        " + ".join(part.name for part in parts),
+        parts[0].function,
+        scales=tuple(scales[1:]),
+        odd=parts[0].odd,
+        sharp=any(part.sharp for part in parts),
+        parts=tuple(parts),
+    )
 
 
 def _step(at: Place, x):
@@ -304,3 +344,5 @@ OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
 PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE, *FROM_ZERO)
 """All forms, in the order of their indices in a compiled program."""
+MOST_NUMBERS = max(one.count for one in PRIMITIVES)
+"""Largest number of parameters of a form that is not a sum."""

@@ -1,0 +1,113 @@
+"""The likelihood of a free function, to second order in its coefficients.
+
+It predicts how well a parametric form would explain the data, without a fit.
+"""
+
+import functools
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ..terms import Family, free_basis, Place, Primitive
+from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._roughness import beside
+from ._slots import Free
+
+
+# Number of points at which a form is compared with the sines that represent it
+_GRID = 400
+
+
+class Start(NamedTuple):
+    """A form with parameters from which a fit may start.
+
+    `gain`: the predicted reduction of the cost, minus the price of the parameters.
+    """
+
+    gain: float
+    primitive: Primitive
+    numbers: np.ndarray
+
+
+class CurveLikelihood(NamedTuple):
+    """The likelihood of a function of a family about its fit, with all other free
+    parameters eliminated.
+
+    Functions with coefficients c reduce the cost by `2 c @ slope - c @ information @
+    c`, both divided by the cost per sample. `gain`: that of the fitted function.
+    `price`: the gain that a parameter requires.
+    """
+
+    family: Family
+    information: Float[np.ndarray, "k k"]
+    slope: Float[np.ndarray, " k"]
+    gain: float
+    price: float
+
+    @classmethod
+    def about(cls, fits: FreeFits, found: Missing, one: Free) -> "CurveLikelihood":
+        """Return the likelihood of one of the functions of a fit."""
+        heat, labels = heat_of(found.fit), one.coefficients
+        subset = Subset(found.problem, found.functions, found.names)
+        quadratic = fits.quadratic(subset, found.fit.point, heat, one)
+        inside, pull = beside(*quadratic, fits.policy.alike)
+        columns = [found.problem.names.index(name) for name in labels]
+        value = np.asarray(found.fit.point.values)[0, columns]
+        slope = inside @ value + pull
+        gain = float(2 * value @ slope - value @ inside @ value)
+        return cls(one.family, inside, slope, gain, math.log(found.problem.samples))
+
+    def sines_of(
+        self, primitive: Primitive, numbers: Float[np.ndarray, "n p"]
+    ) -> Float[np.ndarray, "n k"]:
+        """Return the coefficients of the sums of sines nearest to forms with several
+        sets of parameters.
+        """
+        family = self.family
+        along = np.linspace(family.low, family.high, _GRID)
+        direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
+        place = Place.between(along[None], family.low, family.high)
+        columns = list(numbers.T[:, :, None])
+        values = primitive.value(place, columns, direction[None])
+        values = np.broadcast_to(values, (len(numbers), _GRID))
+        return values @ _projection(family, len(self.slope)).T
+
+    def starts_of(self, primitive: Primitive) -> Float[np.ndarray, "n p"]:
+        """Return all starting values of the parameters of a form of size one."""
+        starts = np.array(list(itertools.product((1.0,), *primitive.starts)))
+        return starts.reshape(-1, primitive.count)
+
+    def gain_of(self, sines: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n"]:
+        """Return the predicted gain of functions with given coefficients."""
+        curved = np.einsum("...a,ab,...b->...", sines, self.information, sines)
+        return 2 * sines @ self.slope - curved
+
+
+@functools.lru_cache(maxsize=8)
+def _projection(family: Family, count: int) -> Float[np.ndarray, "k n"]:
+    """Return the matrix that maps values on the grid to the nearest coefficients."""
+    along = np.linspace(family.low, family.high, _GRID)
+    return np.linalg.pinv(free_basis(family, along, count), rcond=1e-6)
+
+
+def promising(likelihood: CurveLikelihood, most: int) -> list[Start]:
+    """Return at most so many forms with the largest predicted gains."""
+    ranked = []
+    for primitive in likelihood.family.primitives:
+        starts = likelihood.starts_of(primitive)
+        sines = likelihood.sines_of(primitive, starts)
+        told = sines @ likelihood.slope
+        seen = np.einsum("ka,ab,kb->k", sines, likelihood.information, sines)
+        seen = np.where(seen > 0, seen, np.inf)
+        gains = told**2 / seen
+        k = int(np.argmax(gains))
+        size = told[k] / seen[k]
+        if size != 0:
+            numbers = np.array([size, *starts[k][1:]])
+            gain = gains[k] - primitive.count * likelihood.price
+            ranked.append(Start(float(gain), primitive, numbers))
+    ranked.sort(key=lambda each: -each.gain)
+    return ranked[:most]

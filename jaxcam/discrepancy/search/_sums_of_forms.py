@@ -1,0 +1,250 @@
+"""Find sums of parametric forms that resemble a free function.
+
+All pairs of forms are compared on a grid of their parameters, and extended by a third
+form. The most promising sums are refined. All this uses the quadratic likelihood of the
+function; nothing is integrated.
+"""
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import least_squares
+
+from ..terms import MOST_PARTS, Primitive, sum_of
+from ._curve_likelihood import CurveLikelihood, Start
+
+
+# Squared correlation above which the data do not tell two forms apart
+_ALIKE = 0.95
+# Number of sums of each size that are refined, and maximum number of evaluations
+_REFINED, _EVALUATIONS = 8, 40
+# Increase of the gain for which a part is replaced by another
+_MORE = 0.1
+# Step of finite differences, relative to a significant change of a parameter
+_STEP = 0.02
+
+
+class _Sum(NamedTuple):
+    """A sum of forms with its parameters, and its `gain`, as in a `Start`."""
+
+    gain: float
+    parts: tuple[Primitive, ...]
+    numbers: np.ndarray
+
+    @property
+    def own(self) -> list[np.ndarray]:
+        """The parameters of each part."""
+        ends = np.cumsum([part.count for part in self.parts])
+        return np.split(self.numbers, ends[:-1])
+
+    @property
+    def form(self) -> Primitive:
+        return sum_of(self.parts, [own[0] for own in self.own])
+
+    @property
+    def scales(self) -> np.ndarray:
+        """Significant changes of the parameters."""
+        return np.array([abs(self.numbers[0]), *self.form.scales])
+
+    def without(self, k: int) -> "_Sum":
+        """Return the sum without one of its parts."""
+        parts, own = list(self.parts), self.own
+        del parts[k], own[k]
+        return self._replace(parts=tuple(parts), numbers=np.concatenate(own))
+
+
+def _best_of(sums: Iterable[_Sum]) -> list[_Sum]:
+    """Return the best of all sums of the same forms, those with the largest gain
+    first.
+    """
+    ranked = sorted(sums, key=lambda one: one.gain)
+    best = {tuple(sorted(part.name for part in one.parts)): one for one in ranked}
+    return sorted(best.values(), key=lambda one: -one.gain)
+
+
+class _Grid(NamedTuple):
+    """Forms with all their starting values.
+
+    - `rows`: by form, the rows that belong to it.
+    - `numbers`: by form, the parameters.
+    - `seen`: the coefficients in the units of the likelihood, normalised; `sizes`: the
+        sizes of the forms.
+    """
+
+    forms: tuple[Primitive, ...]
+    rows: list[slice]
+    numbers: list[np.ndarray]
+    seen: Float[np.ndarray, "n k"]
+    sizes: Float[np.ndarray, " n"]
+
+    def form_of(self, row: int) -> int:
+        """Return the index of the form to which a row belongs."""
+        return next(k for k, rows in enumerate(self.rows) if row < rows.stop)
+
+    def start_of(self, row: int, size: float) -> tuple[Primitive, np.ndarray]:
+        """Return the form of a row, and its parameters for a normalised size."""
+        kind = self.form_of(row)
+        numbers = self.numbers[kind][row - self.rows[kind].start].copy()
+        numbers[0] = size * self.sizes[row]
+        return self.forms[kind], numbers
+
+
+class SumSearch:
+    """Searches for sums of forms that have the likelihood of a function.
+
+    In its units, a function is a vector, and the cost of the difference of two
+    functions is its square. `best` is the function with the largest likelihood.
+    """
+
+    def __init__(self, likelihood: CurveLikelihood):
+        self.likelihood = likelihood
+        values, vectors = np.linalg.eigh(likelihood.information)
+        kept = values > 0
+        self.root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+        told = vectors[:, kept].T @ likelihood.slope
+        self.best = told / np.sqrt(values[kept])
+        self.grid = self._grid()
+
+    def promising(self, most: int) -> list[Start]:
+        """Return at most so many sums with the largest predicted gains."""
+        guesses, found = _best_of(self._pairs()), []
+        for count in range(2, MOST_PARTS + 1):
+            if count > 2:
+                longer = [self._extended(one) for one in guesses]
+                guesses = _best_of(itertools.chain(*longer))
+            found += self._refined(guesses[:_REFINED])
+        found = _best_of([*found, *self._exchanged(found)])
+        return [Start(one.gain, one.form, one.numbers) for one in found[:most]]
+
+    def _exchanged(self, sums: Sequence[_Sum]) -> list[_Sum]:
+        """Return the sums obtained by replacing parts of the best one in turn, as long
+        as its gain increases.
+        """
+        every: list[_Sum] = []
+        best = max(sums, key=lambda one: one.gain, default=None)
+        while best is not None:
+            rests = self._refined([best.without(k) for k in range(len(best.parts))])
+            others = itertools.chain(*(self._extended(one) for one in rests))
+            found = _best_of(self._refined(_best_of(others)[:_REFINED]))
+            every += found
+            ahead = found and found[0].gain > best.gain + _MORE
+            best = found[0] if ahead else None
+        return every
+
+    def _grid(self) -> _Grid:
+        forms, rows, numbers, seen, first = [], [], [], [], 0
+        for form in self.likelihood.family.primitives:
+            starts = self.likelihood.starts_of(form)
+            starts = starts[[form.within(own) for own in starts]]
+            here = self.likelihood.sines_of(form, starts) @ self.root.T
+            size = np.linalg.norm(here, axis=1)
+            visible = size > 0
+            if not np.any(visible):
+                continue
+            starts, here = starts[visible], here[visible] / size[visible, None]
+            starts[:, 0] = 1 / size[visible]
+            forms.append(form)
+            rows.append(slice(first, first + len(starts)))
+            numbers.append(starts)
+            seen.append(here)
+            first += len(starts)
+        sizes = np.concatenate([own[:, 0] for own in numbers])
+        return _Grid(tuple(forms), rows, numbers, np.concatenate(seen), sizes)
+
+    def _pairs(self) -> Iterator[_Sum]:
+        """Yield the best pair of every two forms on the grid."""
+        grid, price = self.grid, self.likelihood.price
+        told = grid.seen @ self.best
+        kinds = range(len(grid.forms))
+        for a, b in itertools.combinations_with_replacement(kinds, 2):
+            if grid.forms[a].odd != grid.forms[b].odd:
+                continue
+            one, other = grid.rows[a], grid.rows[b]
+            alike = grid.seen[one] @ grid.seen[other].T
+            s, t = told[one, None], told[None, other]
+            apart = np.where(alike**2 < _ALIKE, 1 - alike**2, np.inf)
+            gains = (s**2 + t**2 - 2 * alike * s * t) / apart
+            i, j = np.unravel_index(np.argmax(gains), gains.shape)
+            pair = [one.start + int(i), other.start + int(j)]
+            seen = grid.seen[pair]
+            if not np.isfinite(apart[i, j]):
+                continue
+            sizes = np.linalg.solve(seen @ seen.T, seen @ self.best)
+            each = [grid.start_of(row, size) for row, size in zip(pair, sizes)]
+            parts = tuple(form for form, _ in each)
+            count = sum(form.count for form in parts)
+            numbers = np.concatenate([own for _, own in each])
+            if all(sizes):
+                yield _Sum(float(gains[i, j]) - count * price, parts, numbers)
+
+    def _extended(self, one: _Sum) -> Iterator[_Sum]:
+        """Yield the sum with one more form of each kind.
+
+        The parameters of the sum may change to first order.
+        """
+        grid, price = self.grid, self.likelihood.price
+        across = np.linalg.qr(self._slopes(one.form, one.numbers, one.scales))[0]
+        left = self.best - self._seen(one.form, one.numbers)
+        left -= across @ (across.T @ left)
+        inside = grid.seen @ across
+        squares = 1 - np.sum(inside**2, axis=1)
+        apart = np.where(squares > 1 - _ALIKE, squares, np.inf)
+        # what is left is already perpendicular to the changes of the sum
+        sizes = grid.seen @ left / apart
+        gains = sizes**2 * squares
+        so_far = self.best @ self.best - left @ left - one.form.count * price
+        for form, rows in zip(grid.forms, grid.rows):
+            row = rows.start + int(np.argmax(gains[rows]))
+            if form.odd != one.parts[0].odd or sizes[row] == 0:
+                continue
+            form, own = grid.start_of(row, float(sizes[row]))
+            gain = float(so_far + gains[row] - form.count * price)
+            yield _Sum(gain, (*one.parts, form), np.append(one.numbers, own))
+
+    def _seen(self, form: Primitive, numbers: np.ndarray) -> np.ndarray:
+        """Return a form as a vector, or one for each of several sets of parameters."""
+        sines = self.likelihood.sines_of(form, np.atleast_2d(numbers))
+        seen = sines @ self.root.T
+        return seen if numbers.ndim > 1 else seen[0]
+
+    def _slopes(self, form, numbers, scales) -> Float[np.ndarray, "k p"]:
+        """Return the derivatives of a form with respect to its parameters, in units of
+        their significant changes.
+        """
+        steps = numbers + _STEP * np.diag(scales)
+        return (self._seen(form, steps) - self._seen(form, numbers)).T / _STEP
+
+    def _refined(self, sums: Sequence[_Sum]) -> list[_Sum]:
+        """Return the best sums near given ones, without those whose parameters make no
+        sense or whose parts are alike.
+        """
+        found = []
+        for one in sums:
+            form, start, scales = one.form, one.numbers, one.scales
+            result = least_squares(
+                lambda steps: self._seen(form, start + scales * steps) - self.best,
+                np.zeros(len(start)),
+                jac=lambda steps: self._slopes(  # pyright: ignore[reportArgumentType]
+                    form, start + scales * steps, scales
+                ),
+                max_nfev=_EVALUATIONS,
+            )
+            gain = float(self.best @ self.best - result.fun @ result.fun)
+            gain -= form.count * self.likelihood.price
+            best = one._replace(gain=gain, numbers=start + scales * result.x)
+            sensible = form.within(best.numbers) and np.isfinite(gain)
+            if sensible and not self._alike(best):
+                found.append(best)
+        return found
+
+    def _alike(self, one: _Sum) -> bool:
+        """Return whether the data do not tell two parts of a sum apart."""
+        each = [self._seen(*own) for own in zip(one.parts, one.own)]
+        sizes = [np.linalg.norm(own) for own in each]
+        if not all(sizes):
+            return True
+        units = np.array([own / size for own, size in zip(each, sizes)])
+        return bool(np.any(np.triu(units @ units.T, 1) ** 2 > _ALIKE))
