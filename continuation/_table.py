@@ -1,5 +1,7 @@
 """Print tables of points."""
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 import rich.console
 import rich.table
@@ -13,6 +15,7 @@ def table(
     every: int = 0,
     components: int = 3,
     shown: tuple[str, float] | None = None,
+    columns: Mapping[str, Callable[[Point], float | None]] | None = None,
 ) -> rich.table.Table:
     """Return a table of the special points, ends and some ordinary points of a branch.
 
@@ -23,6 +26,8 @@ def table(
         components: Number of state components to show.
         shown: Heading of the parameter column, and a factor for its values, such as
             `("speed (rpm)", 30 / math.pi)`.
+        columns: Heading, and function of a point, of each column that is shown in place
+            of the norm and the components of the state.
 
     Returns:
         A table for `rich.print`.
@@ -39,35 +44,55 @@ def table(
     factor = 1.0
     if shown is not None:
         names, factor = (shown[0], *names[1:]), shown[1]
-    n = min(components, max((p.state.size for p in branch.points), default=0))
-    heads = _heads(names, n)
-    for head in heads:
-        found.add_column(head, justify="right" if head != "type" else "left")
-    for point in branch.points:
-        if point.kind != "regular" or (every and point.label % every == 0):
-            found.add_row(*_row(point, len(names), n, factor))
+    if columns is None:
+        columns = _components(branch, components)
+    heads = ("label", "type", *names, *columns, "stable")
+    rows = [
+        _row(point, len(names), columns, factor)
+        for point in branch.points
+        if point.kind != "regular" or (every and point.label % every == 0)
+    ]
+    for head, cells in zip(heads, zip(*rows)):
+        # a long heading or name may be broken, but a number must not be cut
+        words = head == "type"
+        parts = [part for cell in cells for part in (cell.split() if words else [cell])]
+        found.add_column(
+            head,
+            justify="left" if words else "right",
+            min_width=max(map(len, parts), default=0),
+            overflow="fold",
+        )
+    for row in rows:
+        found.add_row(*row)
     return found
 
 
-def _heads(names: tuple[str, ...], n: int) -> list[str]:
-    return ["label", "type", *names, "|u|", *[f"u{i + 1}" for i in range(n)], "stable"]
+def _components(
+    branch: Branch, most: int
+) -> dict[str, Callable[[Point], float | None]]:
+    """Return the columns of the norm and the first components of the state."""
+    n = min(most, max((p.state.size for p in branch.points), default=0))
+
+    def component(k: int) -> Callable[[Point], float | None]:
+        return lambda p: float(p.state[k]) if k < p.state.size else None
+
+    norm = {"|u|": lambda p: float(np.linalg.norm(p.state))}
+    return norm | {f"u{k + 1}": component(k) for k in range(n)}
 
 
-def _row(point: Point, parameters: int, n: int, factor: float) -> list[str]:
+def _row(point: Point, parameters: int, columns, factor: float) -> list[str]:
     kind = "" if point.kind == "regular" else point.kind
     if not point.converged:
         kind += " (not converged)"
     stable = {True: "yes", False: "no", None: ""}[point.stable]
     first, *others = point.parameters[-parameters:] or (point.parameter,)
     values = (factor * first, *others)
-    state = [f"{x:.6g}" for x in point.state[:n]]
+    shown = [column(point) for column in columns.values()]
     return [
         str(point.label),
         kind,
         *[f"{x:.9g}" for x in values],
-        f"{np.linalg.norm(point.state):.6g}",
-        *state,
-        *[""] * (n - len(state)),
+        *["" if x is None else f"{x:.6g}" for x in shown],
         stable,
     ]
 

@@ -175,7 +175,7 @@ def test_interrupted_run_says_so(monkeypatch):
         ("simulate --state 0.3", "follower velocity"),
         ("simulate --state 0.1,0", "--state release"),
         ("simulate impact-oscillator --set wall=2", "--state"),
-        ("simulate triple-integrator --state release", "--state release needs"),
+        ("simulate triple-integrator --state release", "at the release point needs"),
         ("simulate --t1 -1", "before t0"),
         ("simulate --t0 nan", "finite"),
         ("simulate --t1 3 --turns 3", "not both"),

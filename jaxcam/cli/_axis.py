@@ -1,6 +1,7 @@
 """Name, unit and bounds of the parameter that a command varies."""
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from ._checks import check_finite
@@ -16,12 +17,20 @@ class Axis(NamedTuple):
     parameter: str
     unit: float
     """One command-line unit, in SI units."""
+    symbol: str = ""
+    """The unit itself, if it is known."""
 
     @staticmethod
-    def of(parameter: str, system: str) -> "Axis":
-        """Return the axis of a parameter of a system, both given by name."""
-        in_rpm = parameter == "speed" and system == CAM
-        return Axis(parameter, math.pi / 30 if in_rpm else 1.0)
+    def of(
+        parameter: str, system: str, units: Mapping[str, str] | None = None
+    ) -> "Axis":
+        """Return the axis of a parameter of a system, both given by name.
+
+        **Arguments:** the units of parameters, as far as they are known.
+        """
+        if parameter == "speed" and system == CAM:
+            return Axis(parameter, math.pi / 30, "rpm")
+        return Axis(parameter, 1.0, (units or {}).get(parameter, ""))
 
     @property
     def in_rpm(self) -> bool:
@@ -35,7 +44,7 @@ class Axis(NamedTuple):
     @property
     def label(self) -> tuple[str, str]:
         """Name and unit, for figures."""
-        return ("speed", "rpm") if self.in_rpm else (self.parameter, "-")
+        return self.parameter, self.symbol
 
 
 def ordered_bounds(low: float | None, high: float | None) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """`jaxcam continue`: follow a periodic orbit and find its bifurcations."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -56,7 +57,7 @@ def continue_(
     from ._progress import progress
 
     keep_compiled_programs()
-    axis = Axis.of(along.parameter, system)
+    axis = Axis.of(along.parameter, system, source.units())
     model = along.started(make_model(system, preset, None, source, set_), axis)
     guess = following.guess
     output = Output(json_file, out)
@@ -84,7 +85,8 @@ def continue_(
             report("drawing", None)
             figures = [_draw(branch, model, axis, out)]
     shown = ("speed (rpm)", 1 / axis.unit) if axis.in_rpm else None
-    output.print(continuation.table(branch, shown=shown))
+    columns = _columns(model.state_names)
+    output.print(continuation.table(branch, shown=shown, columns=columns))
     sentence = _sentence(system, branch, axis)
     output.print(sentence)
     output.print_figures(figures)
@@ -124,6 +126,31 @@ def _refuse_interrupted(path: Path) -> None:
                 f"{file} contains an interrupted branch; add --resume to continue it, "
                 "or give another folder with --out."
             )
+
+
+def _columns(names: Sequence[str]) -> dict[str, Callable[[Any], float | None]]:
+    """Return the columns that describe an orbit: the state sampled at a whole forcing
+    period, and the largest modulus of the multipliers.
+
+    **Arguments:** names of the state components.
+    """
+
+    def component(k: int):
+        def value(point):
+            states = point.observed.get("stroboscopic")
+            return None if states is None else float(states[0][k])
+
+        return value
+
+    def largest(point):
+        return (
+            float(max(abs(m) for m in point.multipliers))
+            if len(point.multipliers)
+            else None
+        )
+
+    found = {name: component(k) for k, name in enumerate(names[:3])}
+    return found | {"largest multiplier": largest}
 
 
 def _sentence(system: str, branch, axis: Axis) -> str:

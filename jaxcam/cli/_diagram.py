@@ -63,7 +63,7 @@ def diagram(
     keep_compiled_programs()
     model = make_model(system, preset, None, source, set_)
     where.check_system(model)
-    axis = Axis.of(sweep.parameter, system)
+    axis = Axis.of(sweep.parameter, system, source.units())
     states = starts.states(sweep)
     looked = sweeps.ImpactSection(model) if sweep.section == "impacts" else model
     output = Output(json_file, out)

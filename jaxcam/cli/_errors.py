@@ -19,7 +19,7 @@ INTERRUPTED = 130
 # messages written for Python refer to arguments, which are options here
 _OPTIONS = (
     ("or pass state=None to start", "or give --state release to start"),
-    ("state=None needs", "--state release needs"),
+    ("state=None needs", "a start at the release point needs"),
     ("pass the state to start from", "give the state to start from with --state"),
     ("pass the states to start from", "give a state to start from, as in --state 0,0"),
     ('engine="diffeqsolve"', "--engine diffeqsolve"),

@@ -56,6 +56,16 @@ class Source:
 
         return read_rig(self.rig).system(float(CamFollower().speed))
 
+    def units(self) -> dict[str, str]:
+        """Return the units that the rig file gives, by the names of the parameters."""
+        from ..fitting import is_setup, read_setup
+
+        if self.rig is None or not is_setup(self.rig):
+            return {}
+        named = None if self.saved is None else str(self.saved)
+        found = read_setup(self.rig, named).parameters
+        return {one.name: one.unit for one in found if one.unit}
+
     def name(self, word: str) -> str:
         """Return the name of the system; `word` names a built-in system.
 

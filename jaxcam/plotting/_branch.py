@@ -95,7 +95,7 @@ def branch_diagram(
     for branch in several:
         _mark(ax, branch, value, x_scale)
     name = several[0].name if several else "parameter"
-    ax.set_xlabel(labelled(*((name, "-") if x_label is None else x_label)))
+    ax.set_xlabel(labelled(*((name, "") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*y_label))
     ax.margins(x=0.03, y=0.08)
     if letters:
@@ -198,5 +198,6 @@ def _name(ax: Axes, points, value, x_scale) -> None:
             fontsize="small",
             color=mark_of(point.kind)[1],
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
-            zorder=5,
+            # below the markers, which its halo would cover
+            zorder=3,
         )

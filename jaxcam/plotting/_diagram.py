@@ -101,7 +101,7 @@ def sweep_diagram(
             )
     name = str(diagram.dataset["component"].values[component])
     unit = str(diagram.dataset["component_unit"].values[component])
-    ax.set_xlabel(labelled(*((diagram.parameter, "-") if not x_label else x_label)))
+    ax.set_xlabel(labelled(*((diagram.parameter, "") if not x_label else x_label)))
     ax.set_ylabel(labelled(*((name, unit) if y_label is None else y_label)))
     ax.set_xlim(float(values.min()), float(values.max()))
     if handles:
@@ -204,8 +204,8 @@ def sweep_chart(
         for word, colour in zip(words, COLOURS, strict=False)
     ]
     one, other = chart.parameters
-    ax.set_xlabel(labelled(*((one, "-") if x_label is None else x_label)))
-    ax.set_ylabel(labelled(*((other, "-") if y_label is None else y_label)))
+    ax.set_xlabel(labelled(*((one, "") if x_label is None else x_label)))
+    ax.set_ylabel(labelled(*((other, "") if y_label is None else y_label)))
     ax.grid(False)
     _above(ax, handles)
     return figure_of(ax)

@@ -76,8 +76,8 @@ def special_curves(
         for point in curve.special:
             _mark(ax, scale * np.array(point.parameters), point.kind)
     names = several[0].names if several else ("first parameter", "second parameter")
-    ax.set_xlabel(labelled(*((names[0], "-") if x_label is None else x_label)))
-    ax.set_ylabel(labelled(*((names[1], "-") if y_label is None else y_label)))
+    ax.set_xlabel(labelled(*((names[0], "") if x_label is None else x_label)))
+    ax.set_ylabel(labelled(*((names[1], "") if y_label is None else y_label)))
     ax.margins(x=0.03, y=0.0)
     in_order = sorted(
         several, key=lambda curve: np.mean([p.parameters[0] for p in curve.points])

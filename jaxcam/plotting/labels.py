@@ -5,7 +5,8 @@ from ..tables import scaled as scaled
 
 
 def labelled(name: str, unit: str) -> str:
-    """Return `name (unit)`; a dimensionless quantity has the unit `-`.
+    """Return `name (unit)`; a dimensionless quantity has the unit `-`, and a quantity
+    whose unit is unknown has an empty one.
 
     Args:
         name: Name of the quantity.
@@ -14,14 +15,17 @@ def labelled(name: str, unit: str) -> str:
     Returns:
         The label.
     """
-    return f"{name} ({_dash(unit)})"
+    if not unit:
+        return name
+    # a hyphen in parentheses is easily overlooked
+    return f"{name} ({'–' if unit == '-' else unit})"
 
 
 def state_label(system: HybridSystem, component: int) -> str:
     """Return the label of one component of the state."""
     names, units = system.state_names, system.state_units
     name = names[component] if component < len(names) else f"$x_{{{component + 1}}}$"
-    unit = units[component] if component < len(units) else "-"
+    unit = units[component] if component < len(units) else ""
     return labelled(name, unit)
 
 
@@ -56,7 +60,3 @@ def speed_unit(system: HybridSystem) -> str:
         return unit
     return f"1/{time}" if unit in ("-", "") else f"{unit}/{time}"
 
-
-def _dash(unit: str) -> str:
-    # a hyphen in parentheses is easily overlooked
-    return "–" if unit in ("-", "") else unit
