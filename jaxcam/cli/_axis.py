@@ -15,7 +15,7 @@ class Axis(NamedTuple):
 
     parameter: str
     unit: float
-    """One command-line unit, in SI units."""
+    """The unit used on the command line, in SI units."""
 
     @staticmethod
     def of(parameter: str, system: str) -> "Axis":

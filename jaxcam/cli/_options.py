@@ -83,7 +83,9 @@ Cluster: TypeAlias = Annotated[
 JsonFile: TypeAlias = Annotated[
     Path | None,
     typer.Option(
-        "--json", metavar="FILE", help=("Write the result to FILE; - prints it.")
+        "--json",
+        metavar="FILE",
+        help="Write the result to FILE, or to standard output if FILE is '-'.",
     ),
 ]
 Resume: TypeAlias = Annotated[
