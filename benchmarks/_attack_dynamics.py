@@ -108,11 +108,10 @@ class Dynamics:
         return after
 
     def held_of(self, t, y, closed):
-        """Those of the gaps `closed`, all with zero normal velocity, that stay in
-        contact.
+        """The gaps among `closed`, all with zero normal velocity, that stay in contact.
 
-        In this set all contact forces are compressive, and all other gaps open; `None`
-        if no set satisfies this to within rounding.
+        The contact forces of these gaps are compressive, and all other closed gaps
+        open; `None` if no set of gaps satisfies this to within rounding.
         """
         closed = tuple(sorted(closed))
         for size in range(len(closed), -1, -1):

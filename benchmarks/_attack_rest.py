@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 
-# : flights up to this height are followed here; the longest lasts about 1e-4
+# flights up to this height are followed here; the longest lasts about 1e-4
 LOW = 1e-9
-# and at the start the acceleration changes by at most this fraction during a flight
+# at the start of a sequence, the acceleration changes by at most this fraction during a
+# flight
 _STEADY = 0.05
 # below this rebound speed impacts are no longer followed; the remaining height is of
 # the order of its square
@@ -44,7 +45,7 @@ def is_low(dynamics, t, y, k, rebound, held) -> bool:
 
 
 def follow(dynamics, t, y, k, rebound, held) -> Rest:
-    """Follow the impacts from the state just after one at gap `k`."""
+    """Follow the impacts from the state just after an impact at gap `k`."""
     d, m = dynamics.d, dynamics.m
     gaps, speeds = dynamics.closing(t, y)
     held = set(held)
@@ -93,7 +94,7 @@ def follow(dynamics, t, y, k, rebound, held) -> Rest:
         push = jump / dynamics.coupling[hit, hit]
         y[d:] += dynamics.across[:, hit] * push
         speeds += dynamics.coupling[:, hit] * push
-        # an impulse may open another gap, or press it closed
+        # an impulse may open another gap in contact, or cause an impact there
         touched = [row for row in held if abs(speeds[row]) > _LAST]
         held.difference_update(touched)
         active.update(touched)

@@ -11,9 +11,9 @@ from ._attack_events import Events
 from ._attack_systems import Problem, stated
 
 
-# : samples between events at which a run is compared, in addition to the ends of steps
+# number of samples at which a run is compared, in addition to the ends of its steps
 SAMPLES = 60
-# a normal acceleration below this (in units of the problem) does not tell how deep
+# smallest normal acceleration used to estimate a depth, in units of the problem
 _LEAST_PULL = 1e-3
 
 

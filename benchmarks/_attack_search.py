@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 
-# : after a release, a gap is ignored until it exceeds this value
+# after a release, a gap is ignored until it exceeds this value
 CLEAR = 1e-9
 # number of intervals into which a step is divided for the search
 _PARTS = 24
@@ -39,7 +39,7 @@ def first_event(dynamics, dense, begin, end, held, fresh, blind) -> Event | None
     found = []
     for k in range(dynamics.m):
         if k not in held:
-            # the part of the step in which a released gap is still near its surface
+            # skip the part of the step in which a released gap is near its surface
             clear = np.flatnonzero(gaps[:, k] > CLEAR) if k in blind else [0]
             if not len(clear):
                 continue

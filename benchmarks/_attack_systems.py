@@ -14,9 +14,9 @@ import numpy as np
 import jaxcam
 
 
-# : numbers of coordinates and gaps of the random systems; each pair is compiled once
+# numbers of coordinates and gaps of the random systems; each pair is compiled once
 SHAPES = ((1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 3))
-# : kinds of initial state
+# kinds of initial state
 STARTS = ("free", "surface", "rest")
 
 
@@ -145,7 +145,7 @@ def _started(problem: Problem, rng) -> Problem:
         closed = () if kind == "free" else (0,)
         state = settled(problem, state, closed, 0.0)
         if kind == "surface":
-            # closed, and opening or closing
+            # the gap is zero, and opens or closes
             state[d:] += rng.normal() * problem.normals[0] / problem.mass
         others = [k for k in range(m) if k not in closed]
         gaps = gaps_of(problem, 0.0, state)
@@ -153,7 +153,7 @@ def _started(problem: Problem, rng) -> Problem:
             resting = closed if kind == "rest" else ()
             return dataclasses.replace(problem, state=state, resting=resting)
         scale *= 0.93
-    # the origin, not on a surface; it may still lie beyond a wall
+    # start at the origin, off all surfaces, and move the walls if it lies beyond one
     lift = np.max(-gaps_of(problem, 0.0, np.zeros(2 * d)))
     offset = problem.offset - max(lift + 0.05, 0.0)
     return dataclasses.replace(problem, offset=offset, state=np.zeros(2 * d))

@@ -41,7 +41,7 @@ class Truth(NamedTuple):
     pieces: list
     # (first, last) time of the sequences of impacts that end in contact, and their gaps
     sequences: list[tuple[float, float, frozenset]]
-    # time up to which all this is known, and why no further
+    # time up to which all this is known, and why it is not known further
     end: float
     reason: str
     # number of components of a state
@@ -149,7 +149,7 @@ class _Loop:
         self.t, self.y, self.fresh = solver.t, solver.y, set()
 
     def _arm(self, dense, a, b):
-        """Check gaps that are clear of the surface again; False if one returns."""
+        """Resume watching gaps that have opened; False if one closes too early."""
         gaps, speeds = self.dynamics.closing(b, dense(b))
         self.unarmed = {k for k in self.unarmed if gaps[k] < CLEAR}
         if any(speeds[k] < 0 or gaps[k] < -CLEAR for k in self.unarmed):
@@ -169,7 +169,7 @@ class _Loop:
                 self.reason = "two releases at once"
 
     def _impact(self, k):
-        """Process an impact, simultaneous ones, and the rest of a sequence."""
+        """Process an impact, simultaneous impacts, and the rest of a sequence."""
         dynamics, t = self.dynamics, self.t
         gap, speeds = dynamics.closing(t, self.y)
         if speeds[k] > -_GRAZE:

@@ -2,11 +2,11 @@
 
 The reference motion is computed three times: once unchanged, and twice with the initial
 state and time shifted by about 1e-8. The differences between the three give the
-permitted error of a run. The comparison ends where their events differ: grazing, or
-growth beyond 1e-5, is not an error. Damping may reduce the shift before it grows again,
-but an error made in between grows in full. That error is assumed to be 1e-8 (about a
-hundred steps at the default tolerance) times the growth since the smallest difference
-so far.
+permitted error of a run. The comparison ends where the events of the three differ
+(grazing) or the shift has grown beyond 1e-5; neither is an error of the run. Damping
+may reduce the shift before it grows again, but an error made in between grows in full.
+That error is assumed to be 1e-8 (about a hundred steps at the default tolerance) times
+the growth since the smallest difference so far.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ from ._attack_truth import motion, Truth
 
 # shift of the start, in units of the problem, and error made during the run
 _MOVED, _ON_THE_WAY = 1e-8, 1e-8
-# difference of two runs that is meaningless
+# differences of two runs below this are meaningless
 _ROUNDING = 1e-12
 # error that is always permitted, and permitted ratio to the effect of the shift
 _FLOOR, _MARGIN = 1e-7, 10.0
@@ -36,8 +36,9 @@ _NEAR = 1e-3
 _THROUGH, _RISE = 1e-9, 1e-8
 # the one failure that docs/limits.md permits for a valid system
 _DOCUMENTED = RESULTS[RESULTS.together]
-# impacts on each of two gaps within `_NEAR` of the end of such a run: so many times, as
-# those of a chatter that is completed on the way are not listed, or so many in no time
+# impacts accumulate if each of two gaps has impacts at `_TIMES` different times, or
+# `_HITS` impacts in all, within `_NEAR` of the end of the run; impacts after the
+# completion of chatter are not listed
 _TIMES, _HITS = 3, 20
 
 
@@ -113,7 +114,7 @@ def judge(problem: Problem, known: Known, **options) -> Verdict:
     try:
         run = simulated(problem, **options)
     except ValueError as error:
-        # the random system and its initial state are valid
+        # an error is wrong here: the random system and its initial state are valid
         return Verdict("MISBLAMES", f"at the start: {error}", 0.0, 0.0)
     except Exception as error:
         said = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -128,7 +129,7 @@ def judge(problem: Problem, known: Known, **options) -> Verdict:
         said = f"t = {mismatch.time:.9g}: {mismatch.what}"
         return Verdict("DISAGREES", said, mismatch.time / problem.span, np.inf)
     if mismatch:
-        # beyond an impact that may or may not occur there is nothing to compare
+        # beyond an impact that may or may not occur, there is nothing to compare
         limit = end = min(end, max(mismatch.time, 0.0))
         label = "grazes"
     compared = end / problem.span
@@ -179,9 +180,7 @@ def _rows(one: Events, other: Events, kind: str) -> np.ndarray:
 
 
 def _distance(one, other) -> np.ndarray:
-    """Largest difference of each state, relative to its magnitude or to one, if that is
-    larger.
-    """
+    """Largest difference of each state, relative to one plus its magnitude."""
     size = 1 + np.max(np.abs(one), axis=1, initial=0.0)
     return np.max(np.abs(one - other), axis=1, initial=0.0) / size
 

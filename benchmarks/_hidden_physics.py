@@ -38,8 +38,8 @@ def _within(x, low, high):
 
 
 def _direction(w):
-    """The sign of a velocity, smooth within a thousandth of the largest, so that an
-    integrator does not stall where the rig sticks.
+    """The sign of a velocity, smoothed below a thousandth of the largest velocity, so
+    that an integrator does not stall where the rig sticks.
     """
     return np.tanh(w / 1e-3)
 

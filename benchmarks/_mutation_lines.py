@@ -1,4 +1,4 @@
-"""Record which lines of some modules run while pytest runs with the given arguments.
+"""Record which lines of some modules pytest executes with the given arguments.
 
 python -m benchmarks._mutation_lines lines.json FILE... -- PYTEST_ARGUMENT...
 """

@@ -1,4 +1,4 @@
-"""A1: the fastest scalar loop found, compiled with numba.
+"""The fastest scalar loop found, compiled with numba.
 
 * Steps of order 8: the tableau is `diffrax.Dopri8`'s, so that both sides of the
   comparison use one method. The free follower is q'' = f(q), so stage velocities drop
@@ -51,7 +51,7 @@ def _fit(function, high, degree):
 _SIN = _fit(lambda z: np.sinc(np.sqrt(z) / np.pi), 2.56, 7)
 _COS = _fit(lambda z: np.cos(np.sqrt(z)), 2.56, 8)
 
-# The contact angle's polynomial on each of _PIECES arcs, as its derivatives there.
+# The contact angle is a polynomial on each of _PIECES arcs, stored as derivatives.
 _PIECES, _DEGREE = 256, 6
 _ARC = 2 * math.pi / _PIECES
 

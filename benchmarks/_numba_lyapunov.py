@@ -1,8 +1,8 @@
 """Lyapunov exponents of the forced oscillator in numba, one batch element at a time.
 
-The Dormand-Prince 5(4) pair with step control on the state and its two deviations
-together, impacts by Newton's method on the step length, and the saltation matrix and
-Gram-Schmidt at every impact.
+It uses the Dormand-Prince 5(4) pair, with step control on the state and its two
+deviations together; it locates impacts by Newton's method on the step length, and
+applies the saltation matrix and Gram-Schmidt at every impact.
 """
 
 import math

@@ -1,8 +1,8 @@
 """A scalar loop for the pendulum of `own_system.py`, compiled with numba.
 
-Steps of `diffrax.Dopri8`, unrolled, with the functions as a user would write them;
-Newton's method on the step length at an impact; chatter completed to second order;
-release from the fixed wall in closed form.
+It takes unrolled steps of `diffrax.Dopri8`, with the functions as a user would write
+them. It locates impacts by Newton's method on the step length, completes chatter to
+second order, and computes the release from the fixed wall in closed form.
 """
 
 import math

@@ -1,7 +1,8 @@
 """Simulate a cam-follower rig with effects that a model may lack, in numba.
 
-It shares no code with `jaxcam.hybrid`: Runge-Kutta steps between samples, impacts by
-bisection, contact follows the surface until the free acceleration lifts off.
+It shares no code with `jaxcam.hybrid`. It takes Runge-Kutta steps between samples and
+locates impacts by bisection; in contact, the follower stays on the surface until its
+free acceleration lifts it off.
 """
 
 import dataclasses
@@ -21,7 +22,7 @@ _ROUNDING = 1e-13
 class Hidden:
     """Effects in addition to the textbook physics; units as in `jaxcam.discrepancy`.
 
-    The last ones are not in the list of named effects: `imbalance` (rad/s^2), the
+    The last four are not in the list of named effects: `imbalance` (rad/s^2), the
     weight of the arm; `fading` (1/s), a coefficient of restitution that falls with
     time; `step` (rad/s^2), a force during half of each turn; `one_way` (rad/s^2),
     friction during upward motion only.

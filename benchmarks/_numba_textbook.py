@@ -1,8 +1,8 @@
-"""A0: the usual scalar loop of textbooks, compiled with numba.
+"""The usual scalar loop of textbooks, compiled with numba.
 
-Adaptive Dormand-Prince 5(4) (first same as last), Newton's method on the step length at
-an impact, and the spring and the cam as printed (thesis, eqs. (4.9) and (4.23)), with
-sin, cos, asin and atan2 from the math library.
+It uses adaptive Dormand-Prince 5(4) steps (first same as last), Newton's method on the
+step length at an impact, and the formulas of the spring and the cam as printed (thesis,
+eqs. (4.9) and (4.23)), with sin, cos, asin and atan2 from the math library.
 """
 
 import math

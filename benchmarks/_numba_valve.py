@@ -1,8 +1,8 @@
 """A scalar loop for the relief valve: Cash-Karp steps of order 5, events by secants.
 
-It does what published codes do with this system: an adaptive embedded method, points on
-the section where the lift rate falls through zero, and impacts at lift zero, both
-located by repeating the step with other lengths.
+It does what published codes do with this system: it uses an adaptive embedded method,
+and locates the points on the section, where the lift rate falls through zero, and the
+impacts, at zero lift, by repeating the step with other lengths.
 """
 
 import numba

@@ -16,7 +16,7 @@ from jaxcam.recordings import Recording
 
 
 INTERVAL, SETTLE = 5e-4, 8.0
-_COUNT = 2 * math.pi / 20000  # of the encoder on the drive
+_COUNT = 2 * math.pi / 20000  # one count of the encoder on the drive (rad)
 _DRIVE_NOISE = 1e-4
 # A rig whose impacts are closer together than this (s) is redrawn
 _CHATTER = 2e-3
@@ -31,7 +31,7 @@ class Maker(NamedTuple):
     - `start`: initial state; `speeds` (rad/s): smallest and largest, for a driven rig.
     - `channels`: name of each channel, and the state component that it measures.
     - `restitution`: the parameter of the impact law of the first gap; `second`: that of
-        the second gap, if it is an impact of the first coordinate as well.
+        the second gap, if its impacts are also impacts of the first coordinate.
     """
 
     field: Callable
@@ -247,8 +247,8 @@ def _measured(maker, setup, motion, rng, hidden) -> dict[str, np.ndarray]:
 class _Flight:
     """A rig with its hidden effect, integrated from impact to impact.
 
-    `begin` is the time at which the record begins. The states of an effect follow those
-    of the rig.
+    `begin` is the time at which the record begins. The states of an effect are appended
+    to those of the rig.
     """
 
     def __init__(self, maker, truth, drive, hidden, begin):

@@ -205,7 +205,7 @@ def fit_with_scipy(nominal, found: list[Window], parameters, limit: int) -> Riva
     def residual(x):
         nonlocal count
         count += 1
-        # one is nominal, so that steps are the same fraction of every tolerance
+        # one is nominal, so that all steps are the same fraction of their tolerances
         values = middle + tolerance * (x[:10] - 1)
         rows = [math.sqrt(3.0) * (x[:10] - 1)]
         for k, window in enumerate(found):

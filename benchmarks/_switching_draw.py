@@ -75,7 +75,7 @@ def _machine(rng, family: str, shape: Shape) -> Problem:
     if shape.rubs and rng.random() < 0.25:
         # it sticks at the start, or slips from rest
         state[d:] = np.linalg.pinv(values["slips"]) @ values["belts"]
-        # so that no slip is left by rounding
+        # so that rounding leaves no slip
         values["belts"] = values["slips"] @ state[d:]
         state[:d] *= 0.3
     ends = shape.wall and bool(np.any(values["slips"][:, 0]))
@@ -129,7 +129,7 @@ def _stops(rng, shape: Shape) -> dict:
         normals[:] = [[1.0], [-1.0]]
     if shape.wall:
         normals[:] = -1.0
-    # below zero: a preloaded spring that always presses near the middle
+    # with a level below zero, a stop is preloaded: it always presses near the middle
     levels = rng.uniform(-0.2, 1.0, size=s)
     return dict(
         normals=normals,
@@ -168,7 +168,7 @@ def _linear(values: dict) -> Linear:
         pressed = values["springs"][k] * rows[f + k] + values["preload"][k] * one
         pressed[d:n] += values["dampers"][k] * values["normals"][k]
         kicks[f + k, d:], loads[f + k] = -values["normals"][k], pressed / 2
-        # half of it on both sides, the other half with the side
+        # half of the force acts on both sides, the other half has the sign of the side
         field += np.outer(kicks[f + k], loads[f + k])
     field[d:] /= values["mass"][:, None]
     kicks[:, d:] /= values["mass"]
@@ -271,7 +271,7 @@ def _shaken(rng) -> Problem:
     )
     state = np.array([rng.normal(), rng.uniform(0.05, 1.0), rng.normal(), rng.normal()])
     if rng.random() < 0.4:
-        # on the plane, if it does not throw the block off at once
+        # start on the plane, if it does not throw the block off at once
         on = np.array([state[0], 0.0, rng.choice([0.0, state[2]]), 0.0])
         state = on if field[3] @ linear.extended(on, 0.0) < -0.01 else state
 

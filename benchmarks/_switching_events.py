@@ -13,9 +13,9 @@ _KINDS = "crosses", "begins sliding", "leaves", "impact", "contact", "release"
 
 
 def listed(events: list[Event]) -> list[Event]:
-    """The events that both programs list, simultaneous ones in the same order.
+    """The events that both programs list, with simultaneous events in the same order.
 
-    Not listed are those at the start, and the last impacts before a constraint closes.
+    Events at the start and the last impacts before a constraint closes are omitted.
     """
     closed = [(e.time, e.which) for e in events if e.kind == CLOSES]
     found = []
@@ -33,7 +33,7 @@ def listed(events: list[Event]) -> list[Event]:
 
 
 def events_of(run) -> list[Event]:
-    """The events of a run of jaxcam; a crossing by the jump of an impact is none."""
+    """The events of a run of jaxcam, without crossings by the jump at an impact."""
     hits, rests, switches = run.impacts, run.contacts, run.switches
     found = [
         Event(float(t), HITS, int(k), np.asarray(x), float(v))
@@ -68,8 +68,8 @@ def distance(one, other) -> float:
 
 
 def differ(one: Event, other: Event) -> float:
-    """The difference of two events of the same kind: of their times, or of their
-    states.
+    """The difference of two events of the same kind: that of their times or that of
+    their states, whichever is larger.
     """
     return max(abs(one.time - other.time), distance(one.state, other.state))
 

@@ -1,10 +1,11 @@
 """The exact motion of a piecewise-linear system, from event to event.
 
 The rules are those of the documentation. A motion that arrives at a surface on which it
-can slide begins to slide if the term that is needed is at most its (static) limit, and
-crosses otherwise; it leaves where the needed term exceeds the limit. An impact reverses
-the normal velocity with its coefficient of restitution. Impacts that accumulate are
-followed one by one until their speed is below 1e-12; then the constraint is closed.
+can slide begins to slide if the term needed to hold it there is at most its (static)
+limit, and crosses otherwise; it leaves where that term exceeds the limit. An impact
+reverses the normal velocity with its coefficient of restitution. Impacts that
+accumulate are followed one by one until their speed is below 1e-12; then the constraint
+is closed.
 """
 
 import itertools
@@ -21,7 +22,7 @@ _CLOSED = 1e-12
 # a velocity below this is zero after an event that stops it
 _STOPPED = 1e-13
 _MOST_EVENTS = 4000
-# events of surfaces in a row, each within this time of the last, that accumulate
+# this many successive events at surfaces, each this soon after the last, accumulate
 _CROWD, _SHORT = 30, 1e-4
 CROSSES, SLIDES, LEAVES, HITS, CLOSES, OPENS = range(6)
 
@@ -93,7 +94,7 @@ class _Loop:
         self.programs, self.system = programs, programs.system
         self.t, self.x, self.noise, self.ends = 0.0, x, noise, ends
         self.events, self.reason = [], ""
-        # surfaces and gaps that are zero, by guard, and how many derivatives are
+        # surfaces and gaps that are zero: number of zero coefficients of each guard
         self.zeros: dict[tuple[str, int], int] = {}
         self.crowd = 0
         k, m = len(self.system.rows), len(self.system.gaps)
@@ -146,7 +147,7 @@ class _Loop:
             self.reason = "events accumulate"
 
     def _order(self, rules: Law, guard: int, order: int) -> int:
-        """The derivatives of a guard that are zero, after all simultaneous events."""
+        """Number of zero Taylor coefficients of a guard, after simultaneous events."""
         rate = rules.guards[guard] @ rules.matrix @ self.z
         return 1 if order == 2 and abs(rate) > 1e-9 else order
 
@@ -177,7 +178,7 @@ class _Loop:
             self.zeros["gap", k] = 3
             self._log(OPENS, k)
             if self.system.rubs and self.mode.sliding[0]:
-                # nothing holds the slip in flight
+                # without contact, no friction holds the slip
                 self._stop()
             self._recheck()
 
@@ -210,8 +211,8 @@ class _Loop:
     def _begin(self, touched: list[int]):
         """Slide from the start on as many of the touched surfaces as possible.
 
-        On the others, the motion enters a side. Several ways to do so are several
-        motions.
+        From the others, the motion enters one of the sides. If it can do so in several
+        ways, it is not unique.
         """
         able = [k for k in touched if self._can_slide(k)]
         for number in range(len(able), -1, -1):
@@ -240,7 +241,7 @@ class _Loop:
             self.zeros["side", k] = 1
 
     def _possible(self, mode: Mode, held, others) -> bool:
-        """Whether a mode holds and enters the surfaces as it says."""
+        """Whether the motion can slide on `held` and enter the sides of `others`."""
         rules, z, rows = self.programs.law(mode), self.z, self.system.rows
         holds = all(abs(rules.needed[k] @ z) <= rules.limit[k] @ z for k in held)
         rates = [mode.sides[k] * (rows[k] @ rules.matrix @ z) for k in others]
@@ -321,8 +322,8 @@ class _Loop:
         self._recheck()
 
     def _after_jump(self, stops: bool):
-        """The sides after an impact, and the end of sliding where it moves the state
-        off the surface.
+        """Update the sides after an impact, and end sliding where the impact moves the
+        state off the surface.
         """
         heights = self.system.rows @ self.z
         sides, sliding = list(self.mode.sides), list(self.mode.sliding)

@@ -11,7 +11,7 @@ _OUTSIDE, _RISE = 1e-9, 1e-9
 
 
 def broken(problem: Problem, run, end: float) -> str:
-    """What a run violates up to the time `end`, or an empty string."""
+    """A condition that a run violates before the time `end`, or an empty string."""
     number = int(run.steps.count)
     times = np.asarray(run.steps.time)[:number]
     states = np.asarray(run.steps.state)[:number]
@@ -51,7 +51,7 @@ def _cone(problem: Problem, run, times, states, sides, contact) -> str:
 
 
 def _held(linear: Linear, rules: Law, t: float, x) -> str:
-    """What holds a surface beyond its limit, or slips, at one point."""
+    """A surface that slips or is held beyond its limit at one point, in words."""
     z, size = linear.extended(x, t), 1 + np.max(np.abs(x))
     for k in rules.needed:
         needed, limit = abs(rules.needed[k] @ z), rules.limit[k] @ z

@@ -8,8 +8,8 @@ where s_k = +-1 is the side of surface k, on which c_k z = 0, b_k a direction an
 the size of the change. While the motion slides on surface k, the term of this surface
 is b_k p_k, where p_k keeps c_k z at zero; it may be at most `holding` r_k z in size.
 While a constraint is in contact, a multiplier times the direction w_j keeps its gap at
-zero. All multipliers are linear in z, and so is every condition that ends a mode. It
-does not use jaxcam.
+zero. All multipliers are linear in z, and so is every condition that ends a mode. This
+module does not use jaxcam.
 """
 
 from typing import NamedTuple
@@ -44,7 +44,7 @@ class Linear(NamedTuple):
     gaps: np.ndarray
     normals: np.ndarray
     restitution: np.ndarray
-    # friction coefficient of contact 0 against the slip of surface 0, or 0
+    # friction coefficient of contact 0 against the slip of surface 0, or 0 if none
     rubs: float = 0.0
 
     def extended(self, x, t: float) -> np.ndarray:
@@ -70,7 +70,8 @@ class Law(NamedTuple):
 
     matrix: np.ndarray
     guards: np.ndarray
-    # ("side", k), ("upper", k), ("lower", k), ("gap", j) or ("force", j) of each guard
+    # name of each guard: ("side", k), ("upper", k), ("lower", k), ("gap", j) or
+    # ("force", j)
     names: list[tuple[str, int]]
     # needed term p_k of each sliding surface, and its largest size, as rows
     needed: dict[int, np.ndarray]

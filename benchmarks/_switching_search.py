@@ -2,7 +2,7 @@
 
 The motion is known on a grid of powers of the matrix exponential. Between two points of
 the grid it is the Taylor series of the exponential, so a guard is a polynomial there.
-An interval is searched if a guard is negative at its end, or if a bound of the second
+An interval is searched if a guard is negative at its end, or if a bound on the second
 derivative admits a minimum below zero within it.
 """
 
@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from ._switching_linear import Law
 
 
-# angle of the fastest frequency per interval of the grid, and length of the grid
+# angle of the fastest frequency per interval of the grid, and number of its points
 _ANGLE, _POINTS = 0.3, 48
 # terms of the Taylor series; samples of a polynomial in one interval
 _TERMS, _SAMPLES = 22, 9
@@ -79,8 +79,8 @@ class Grid:
 def first_in(grid: Grid, z, zeros: dict[int, int], end: float) -> Fall | None:
     """The first guard that falls through zero within one interval from z.
 
-    `zeros` gives the guards that are zero at z, with the number of their derivatives
-    that are; `end` is the end of the search in units of the interval.
+    `zeros` gives the guards that are zero at z, with the number of their leading Taylor
+    coefficients that are zero; `end` is the end of the search in units of the interval.
     """
     terms = grid.series(z)
     guards = terms @ grid.rows[0]
@@ -121,7 +121,7 @@ def _first_root(coefficients, end: float) -> float | None:
 
 
 def _root(down: list, a: float, b: float) -> float:
-    # a value near zero may have either sign, depending on the order of its sum
+    # a value near zero may have either sign, depending on the order of summation
     if _value(down, a) * _value(down, b) >= 0:
         return b
     found: Any = brentq(lambda s: _value(down, s), a, b, xtol=1e-300, rtol=_EXACT)

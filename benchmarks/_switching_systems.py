@@ -60,7 +60,7 @@ class Machine(SwitchedSystem):
 
 
 class Walled(Machine):
-    """The same with a wall that the first mass hits."""
+    """A `Machine` with a wall that the first mass hits."""
 
     wall: jax.Array
     restitution: jax.Array
@@ -109,7 +109,7 @@ class Shaken(SwitchedSystem):
     The state is (position, height, and their velocities) relative to the plane.
     """
 
-    # accelerations along the plane and normal to it: constant, and of the shaking
+    # accelerations along the plane and normal to it: gravity, and amplitude of shaking
     gravity: jax.Array
     shaking: jax.Array
     omega: jax.Array

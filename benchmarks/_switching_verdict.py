@@ -2,11 +2,11 @@
 
 The exact motion is computed three times: once unchanged, and twice with opposite
 changes of about 1e-8 at the start and after each event. The largest difference so far,
-over 1e-8, is the growth of errors; a run may differ by 1e-9 times this growth (at least
-one). The comparison ends before the first event that the three motions do not share
-(grazing), where the growth exceeds 1e4, at an impact slower than 1e-6 that only one of
-jaxcam and the exact motion has, and where impacts accumulate on a body with
-friction normal to a wall, which jaxcam does not sum (docs/switching.md).
+divided by 1e-8, is the growth of errors (at least one); a run may differ by 1e-9 times
+this growth. The comparison ends before the first event that the three motions do not
+share (grazing), where the growth exceeds 1e4, at an impact slower than 1e-6 that occurs
+only in the run or only in the exact motion, and where impacts accumulate on a body with
+a friction force normal to the wall, which jaxcam does not sum (docs/switching.md).
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from ._switching_exact import Event, Exact, HITS, motion, Noise, Programs
 from ._switching_invariants import broken
 
 
-# permitted error of times and states, times the growth of errors
+# permitted error of times and states, relative to the growth of errors
 ALLOWED = 1e-9
 SETTINGS = Settings(tolerance=1e-12)
 _NOISE, _LOST = 1e-8, 1e4
@@ -59,7 +59,7 @@ class Known(NamedTuple):
 
 
 def know(problem: Problem) -> Known:
-    """The exact motion of a problem, and up to where it is known."""
+    """The exact motion of a problem, and the time up to which it is known."""
     programs = Programs(problem.linear)
     exact = motion(programs, problem.state, problem.span, ends=problem.ends)
     events = listed(exact.events)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 
 
-# Samples of a recording, which is one period of its input; a further period precedes it
+# Number of samples of a recording: one period of its input, preceded by another period
 SAMPLES = 2048
 # Recordings from which a model is learnt, with the size of the input in each
 SIZES = (1.0, 0.7, 0.85)
@@ -27,9 +27,10 @@ class Case(NamedTuple):
 
     - `rate` (Hz) of the samples; `band` (Hz) and `rms` of the input.
     - `force(x, v, z)`: the part that no linear oscillator has.
-    - `memory(v, z)`: rate of change of its own state z, if it has one.
+    - `memory(v, z)`: rate of change of the internal state z of the force, if any.
     - `linear`: nominal stiffness, if it is not that of the oscillator alone.
-    - `stop`, `restitution`: position of a stop above the mass, and of its impacts.
+    - `stop`, `restitution`: position of a stop above the mass, and coefficient of
+        restitution of impacts on it.
     """
 
     rate: float
@@ -83,7 +84,7 @@ _SILVER = Case(2441.4, (1.0, 200.0), 0.04, _BOX, lambda x, v, z: -_CUBIC * x**3)
 
 
 def _bouc_wen(mass, damping, stiffness, alpha, beta, gamma, delta, rms) -> Case:
-    """The oscillator of Noel and Schoukens (2016), exponent 1."""
+    """The oscillator of Noel and Schoukens (2016), with exponent 1."""
     truth = {"stiffness": stiffness / mass, "damping": damping / mass, "gain": 1 / mass}
 
     def memory(v, z):
@@ -131,7 +132,7 @@ def moved(case: Case, u: np.ndarray) -> Motion:
         after = odeint(
             case.field, state, [0.0, step], (level,), rtol=1e-11, atol=1e-13
         )[1]
-        # no motion that comes near the stop misses it
+        # near the stop, integrate again with event location, to miss no impact
         near = max(state[0] + step * abs(state[1]), after[0] + step * abs(after[1]))
         if near < case.stop:
             state = after

@@ -24,7 +24,7 @@ from jaxcam.recordings import Recording
 
 
 class Oscillator(HybridSystem):
-    """A linear oscillator with an input, which meets nothing."""
+    """A linear oscillator with an input and without impacts."""
 
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
@@ -47,7 +47,7 @@ class Oscillator(HybridSystem):
 
 
 class Stopped(Oscillator):
-    """The same below a stop."""
+    """The same oscillator below a stop."""
 
     stop: float = 1.0  # m
     restitution: float = 0.5
@@ -101,7 +101,7 @@ class Found:
         self.cpu = time.process_time() - spent
 
     def model(self, textbook: bool) -> Model:
-        """The fitted textbook model, or the one with what was found."""
+        """The fitted textbook model, or the one with the terms that were found."""
         found = self.diagnosis
         if textbook:
             return found.before.model(0)
@@ -111,7 +111,7 @@ class Found:
         return Model(found.system(), base.sensors, self.setup.model.drive)
 
     def acceleration(self, motion: Motion, textbook: bool) -> np.ndarray:
-        """Acceleration along a true motion; an element follows that motion."""
+        """Acceleration along a true motion, which also drives an added element."""
         system = self.model(textbook).system
         size = len(system.state_names or "xv") - 2
         own = jnp.zeros(max(size, 0))

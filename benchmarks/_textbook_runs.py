@@ -1,4 +1,4 @@
-"""Free runs of any model of an oscillator with a held input, and of its stop."""
+"""Free runs of any oscillator model with a held input, with or without a stop."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 
-# Steps between two samples; samples from which a free run starts
+# Number of steps between two samples, and of samples from which a free run starts
 _STEPS, START = 2, 20
-# Steps of Gauss-Newton on the initial state, and its relative differences
+# Gauss-Newton steps for the initial state, and relative size of finite differences
 _NEWTON, _APART = 8, 1e-4
 # A run this many times larger than its measurement has diverged
 _LARGE = 30.0
@@ -72,7 +72,7 @@ def _positions(field, step, state, levels, stop, restitution, limit) -> np.ndarr
 
 
 def _advanced(field, h, state, u, stop, restitution):
-    """A step of Runge-Kutta, with an impact if the stop is reached."""
+    """A Runge-Kutta step, with an impact if the stop is reached."""
     after = _step(field, h, state, u)
     if not after[0] > stop:
         return after
@@ -101,7 +101,7 @@ def _step(field, h, x, u):
 
 
 def _step_of_two(field, h, x, u):
-    """The same for two states, several times as fast."""
+    """The same step for two states, several times as fast."""
     p, v = x
     v1, a1 = field(x, u)
     v2, a2 = field((p + h / 2 * v1, v + h / 2 * a1), u)
@@ -121,5 +121,5 @@ def error_of(found: np.ndarray, true: np.ndarray) -> float:
 
 
 def force_error(found: np.ndarray, true: np.ndarray, extra: np.ndarray) -> float:
-    """RMS error of an acceleration by the rms of the extra force."""
+    """RMS error of an acceleration, divided by the rms of the extra force."""
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(extra**2)))

@@ -1,8 +1,8 @@
 """The baseline: sparse regression on derivatives by pysindy (SINDy with control).
 
-The acceleration of the position is regressed on position, velocity and input. Its
-settings are chosen on the last recording: those whose free run of it is best, in a fit
-to the other recordings; the model is then fitted to all of them. The choice is among
+The acceleration is regressed on position, velocity and input. The settings are those
+with the best free run of the last recording after a fit to the other recordings; the
+model is then fitted to all recordings. The choice is among
 
 - windows of the smoothed differences (Savitzky-Golay, cubic). The input passes through
   the same filters as the acceleration, and is taken halfway between its jumps;
@@ -36,10 +36,10 @@ if importlib.util.find_spec("pysindy"):
 WINDOWS = (1, 5, 9, 17)
 # Orders of the differences
 ORDERS = (6,)
-# Half lengths of the test functions, in samples; none is the strong form
+# Half lengths of the test functions, in samples; None selects the strong form
 LENGTHS = (None, 12, 24, 48)
 THRESHOLDS = (0.0, 3e-4, 1e-3, 3e-3, 1e-2)
-# Test functions of a recording
+# Number of test functions per recording
 _TESTS = 200
 # Shortest flight that is used, in windows
 _FLIGHT = 2
@@ -163,7 +163,7 @@ def _fitted(case, prepared, signs, threshold, length, scales) -> Regression:
 
 
 def _weak(case, states, inputs, signs, optimizer, length, scales):
-    """The weak form, with the input as a third state; its equation is not used."""
+    """The weak form, with the input as a third state, whose equation is not used."""
     step = 1 / case.rate / scales.t
     shortest = min(map(len, states))
     time = step * np.arange(shortest)
@@ -175,7 +175,7 @@ def _weak(case, states, inputs, signs, optimizer, length, scales):
 
 @functools.cache
 def _weak_library(count: int, step: float, length: int, signs: bool):
-    np.random.seed(0)  # of the places of the test functions
+    np.random.seed(0)  # for the positions of the test functions
     return pysindy.WeakPDELibrary(
         _library(signs),
         spatiotemporal_grid=step * np.arange(count),
@@ -187,8 +187,8 @@ def _weak_library(count: int, step: float, length: int, signs: bool):
 def regress(case: Case, runs, *, split: bool = False, report=None):
     """Fit the best regression to recordings `(time, position, input, impacts)`.
 
-    With `split`, derivatives are taken within flights, and free runs of the selection
-    have the true impact law.
+    With `split`, derivatives are taken within flights, and the free runs that select
+    the settings use the true impact law.
 
     **Returns:** the `Regression`, its settings in words, and the seconds that the
     search took.

@@ -29,7 +29,7 @@ def hidden_records(
 
 
 def close(true: float, value: float, stderr: float) -> bool:
-    """Within 15 per cent or two standard errors."""
+    """Whether a value is within 15 per cent or two standard errors of the true one."""
     return abs(value - true) < max(0.15 * true, 2 * stderr)
 
 
@@ -42,7 +42,7 @@ class Kept:
         self._known = {key(one): one for one in map(json.loads, lines)}
 
     def get(self, case, judge: Callable, said: Callable[[dict], str]) -> dict:
-        """The verdict on a case, stored or from `judge()`; it is printed."""
+        """The verdict on a case, from the file or from `judge()`; it is printed."""
         if case not in self._known:
             one = judge()
             self._known[self._key(one)] = one

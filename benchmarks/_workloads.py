@@ -1,8 +1,9 @@
 """The two workloads of the speed comparison, and the cam-follower they run on.
 
-Plain numpy, shared by every side of the comparison, so that all start from the same
-numbers. The system has the parameters of Table 4.4, with the cam turning clockwise: cam
-angle `theta = -speed * t`, follower state `(angle, velocity)` in rad and rad/s.
+The code is plain numpy and is shared by all sides of the comparison, so that they start
+from the same numbers. The system has the parameters of Table 4.4, with the cam turning
+clockwise: cam angle `theta = -speed * t`, follower state `(angle, velocity)` in rad and
+rad/s.
 """
 
 from dataclasses import dataclass
@@ -94,8 +95,8 @@ _REST_SPRING, _REST_CAM = spring(cam(-_PHASES)), cam(-_PHASES, 2)
 def release_time(speed) -> np.ndarray:
     """First time in (0, period] at which a follower at rest on the cam is released.
 
-    There the relative acceleration crosses zero upward; infinite if it never does.
-    `speed` (lanes,) is in rad/s; returns (lanes,) in s.
+    At this time, the relative acceleration crosses zero upward; the time is infinite if
+    it never does. `speed` (lanes,) is in rad/s; the times (lanes,) are in s.
     """
     speed, back = np.unique(np.asarray(speed, float), return_inverse=True)
     values = _REST_SPRING - speed[:, None] ** 2 * _REST_CAM

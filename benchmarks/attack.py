@@ -20,13 +20,13 @@ from ._attack_systems import draw, Problem, SHAPES
 from ._attack_verdict import judge, know, plain, Verdict
 
 
-# : verdicts that indicate a defect
+# verdicts that indicate a defect
 WRONG = ("DISAGREES", "MISBLAMES")
 
 
 def attack(problem: Problem, sampled: bool = True) -> Verdict:
-    """The verdict on a problem; for a disagreement, also whether only these units cause
-    it.
+    """The verdict on a problem; for a disagreement, also whether it occurs only in
+    these units.
     """
     known = know(problem)
     verdict = judge(problem, known, sampled=sampled)

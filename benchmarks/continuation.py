@@ -6,9 +6,9 @@
 The second command times one branch from an empty cache of compiled programs: from one
 impact per period through grazing bifurcations to complete chatter.
 
-One pinned core, float64, minimum CPU time of interleaved runs after one for
-compilation. AUTO-07p (`auto`, Debian package auto-07p) is run for comparison if it is
-installed.
+Times are minimum CPU times of interleaved runs on one pinned core in float64, after a
+first run for compilation. AUTO-07p (`auto`, Debian package auto-07p) is run for
+comparison if it is installed.
 """
 
 import argparse

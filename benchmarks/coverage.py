@@ -4,9 +4,9 @@ Rigs are drawn at random from the tolerance box, simulated by a scalar Runge-Kut
 that shares no code with the fit, recorded through noisy encoders at three noise levels,
 cut, and fitted. The script prints, for each level and parameter, the fraction of
 intervals that contain the true value, and the mean (bias) and spread of the errors in
-standard errors; and the residuals. Parameters that the data do not determine depend on
-the tolerances, so only another rig is an independent case: many rigs are more
-informative than many noise realizations.
+standard errors; it also prints the residuals. The estimates of parameters that the data
+do not determine depend on the tolerances, so only another rig is an independent case:
+many rigs are more informative than many noise realizations.
 
 The bias has two parts: one from the choice of rigs, which a linear model without noise
 would also have, and the rest, which is due to the fit. Both are printed with their
@@ -124,8 +124,8 @@ def recording(truth: Truth, sensors, name: str, rng) -> Recording:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One fit; `off` contains the errors and standard errors, `held` the cost of the
-    truth.
+    """One fit; `off` contains the errors and standard errors, `held` the cost with a
+    parameter held at its true value.
 
     Cases of one `group` share a rig; groups are independent. `drawn` is the error due
     to the tolerances alone: if the data carry no information about a parameter, its

@@ -1,7 +1,7 @@
 """Test whether a parameter that differs from recording to recording is found.
 
 A rig of `docs/rigs` is drawn at random within its tolerances. One of its parameters has
-another value in each of four recordings, equally far apart.
+a different value in each of four recordings; the four values are equally spaced.
 
     python -m benchmarks.differing_records two_stops damping_over_mass 0.05
 """

@@ -1,10 +1,10 @@
 """Measure the first simulation in a process, with each compiler.
 
 Every measurement runs in a process of its own: first with an empty folder for compiled
-programs, then with the folder that the first one filled. The script prints the CPU time
-in seconds of the first `simulate` (3 to 20 s of motion), of the first `trajectory.at`,
-and of the same two calls in the second process. Importing jax and jaxcam is not
-included.
+programs, then with the folder that the first process filled. The script prints the CPU
+time in seconds of the first `simulate` (3 to 20 s of motion), of the first
+`trajectory.at`, and of the same two calls in the second process. Importing jax and
+jaxcam is not included.
 
     python -m benchmarks.first_call
 """

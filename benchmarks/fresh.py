@@ -32,7 +32,7 @@ from .coverage import random_rig
 DURATION = 4.0
 SPANS_RPM = ((128, 140), (140, 148), (141, 149), (150, 158), (158, 173), (160, 178))
 LEVELS = (0.1, 0.2, 0.3, 0.5, 1.0)
-#: name of the effect, its number in `Hidden`, and its unit
+# name of the effect, its field in `Hidden`, and its unit
 UNITS = {
     "viscous_damping": ("c1", 0.18),
     "coulomb_friction": ("fc", 0.3),
@@ -48,7 +48,7 @@ UNITS = {
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """The hidden effects, by their number in `Hidden`, and the recordings."""
+    """The names and strengths of the hidden effects, and the recordings."""
 
     names: tuple[str, ...]
     level: float

@@ -1,4 +1,4 @@
-"""Test malformed files and command lines for a given time.
+"""Test jaxcam with malformed files and command lines for a given time.
 
     python -m benchmarks.fuzz --minutes 20
     python -m benchmarks.fuzz --minutes 2 --only tables --seed 7

@@ -2,8 +2,8 @@
 
     python -m benchmarks.gpu
 
-Both sides run the same program, of the LLVM backend, at a tolerance of 1e-9. Times are
-those of whole calls of `stroboscope`, compiled before, with all copies.
+Both sides run the same program of the LLVM backend, at a tolerance of 1e-9. Times are
+those of whole calls of `stroboscope` after compilation, including all copies of data.
 """
 
 import os

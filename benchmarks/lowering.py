@@ -2,10 +2,11 @@
 
     python -m benchmarks.lowering
 
-The rig at 145 rpm, tolerance 1e-9, one pinned core. Each pass is switched off by
-itself, in a separate process. The columns are the CPU seconds of the first call, and
-the CPU microseconds per turn of one trajectory (`flow`) and of a batch (`stroboscope`),
-each the minimum of several runs; then the same relative to the row with all passes.
+The rig runs at 145 rpm, with a tolerance of 1e-9, on one pinned core. Each pass is
+switched off alone, in a separate process. The columns are the CPU seconds of the first
+call, and the CPU microseconds per turn of one trajectory (`flow`) and of a batch
+(`stroboscope`), each the minimum of several runs; then the same relative to the row
+with all passes.
 """
 
 import json

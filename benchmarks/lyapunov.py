@@ -3,9 +3,10 @@
     python -m benchmarks.lyapunov                 # 1000 values, 2000 turns
     python -m benchmarks.lyapunov --lanes 128 --turns 200
 
-The damped forced oscillator with about one impact per period, at frequencies between
-3.2 and 3.9 (orbits with one impact, and chaos). One pinned core, minimum CPU time of
-interleaved runs, tolerance 1e-9 on both sides. Requires `pip install -e ".[bench]"`.
+The system is the damped forced oscillator with about one impact per period, at
+frequencies between 3.2 and 3.9 (orbits with one impact, and chaos). Times are minimum
+CPU times of interleaved runs on one pinned core, at a tolerance of 1e-9 on both sides.
+Requires `pip install -e ".[bench]"`.
 """
 
 from benchmarks import _timing

@@ -3,8 +3,8 @@
     python -m benchmarks.operations
 
 Operations are counted in the program of one attempt for the cam-follower, before the
-compiler fuses it. A division or square root costs as much as several additions. The
-number of attempts per turn follows.
+compiler fuses them. A division or square root costs as much as several additions. The
+number of attempts per turn is printed last.
 """
 
 import collections
@@ -23,7 +23,7 @@ from jaxcam.hybrid.loop._loop_state import first_state
 from jaxcam.models import CamFollower, rpm_to_rad_s
 
 
-# : function of the loop from which an operation is called, innermost first
+# part of a step for each function of the loop; of nested ones, the innermost counts
 PARTS = {
     "step": "stages of the step",
     "error_norm": "stages of the step",
@@ -84,7 +84,7 @@ def part_of(equation) -> str:
 
 
 def attempts(rpm: float = 145.0, settled: int = 50, turns: int = 100) -> str:
-    """Describe the attempts and events in a turn of the settled motion, which is
+    """Describe the attempts and events per turn of the settled motion, which is
     P(inf,1).
 
     A step length depends on the previous ones, so the number of steps depends on the

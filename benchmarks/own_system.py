@@ -3,8 +3,8 @@
     python -m benchmarks.own_system
 
 The system is a forced pendulum leaning on a wall, defined as in the README, with a grid
-of initial states. One pinned core, minimum CPU time of interleaved runs, tolerance
-1e-9.
+of initial states. Times are minimum CPU times of interleaved runs on one pinned core,
+at a tolerance of 1e-9.
 """
 
 from benchmarks import _timing

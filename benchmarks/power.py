@@ -32,7 +32,7 @@ from .coverage import random_rig
 DURATION = 2.0
 SPANS_RPM = ((128.0, 145.0), (146.0, 158.0), (159.0, 175.0))
 LEVELS = (0.5, 1.0, 2.0, 4.0)
-# : name of the effect, its number in `Hidden`, and a unit if no limit is reported
+# name of the effect, its field in `Hidden`, and a unit if no limit is reported
 EFFECTS = {
     "viscous_damping": ("c1", None),
     "coulomb_friction": ("fc", None),
@@ -44,7 +44,7 @@ EFFECTS = {
     "external_vibration": ("ext", 0.03),
     "drive_ripple": ("eps", 1e-5),
 }
-# : unnamed effects, and strengths at which they matter
+# unnamed effects, and strengths at which they matter
 UNLISTED = {"imbalance": 0.3, "fading": 0.005, "step": 0.1, "one_way": 0.1}
 
 

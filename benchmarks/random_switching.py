@@ -7,9 +7,10 @@ The systems are piecewise linear with harmonic forces: soft stops, backlash and
 preloaded springs, relays with hysteresis and without, dry friction on the ground, on
 belts and between two masses, with static friction and varying loads, impacts, and a
 block in contact with a shaken plane. The reference computes their motion with matrix
-exponentials and shares no code with jaxcam. Compared are the order and the times of all
-events, the states there and the final state; the friction forces of sticking bodies
-must be within their limits, and the energy of systems without a drive must not rise.
+exponentials and shares no code with jaxcam. The script compares the order and the times
+of all events, the states at the events, and the final state; in addition, the friction
+forces of sticking bodies must be within their limits, and the energy of systems without
+a drive must not rise.
 Every disagreement is printed with its seed, then a table. The exit code is 1 if a
 system disagrees.
 """

@@ -12,9 +12,9 @@ import json
 from pathlib import Path
 
 
-#: announced before the verdicts were made
+# announced before the verdicts were made
 ANNOUNCED = "b325e7e4dc2082498320961c9ce65df65c319d6a59767212f9791ea104cf4b01"
-# : effects without a name, for which `unknown` is correct
+# effects that have a name; for all others, `unknown` is correct
 NAMED = {
     "viscous_damping",
     "coulomb_friction",

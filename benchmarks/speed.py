@@ -2,8 +2,8 @@
 
     python -m benchmarks.speed # all parts, one table each
 
-One pinned core, minimum CPU time of interleaved runs, tolerance 1e-9 on every side,
-float64. Requires `pip install -e ".[bench]"`.
+Times are minimum CPU times of interleaved runs on one pinned core in float64, at a
+tolerance of 1e-9 on every side. Requires `pip install -e ".[bench]"`.
 """
 
 import subprocess
@@ -32,7 +32,7 @@ BY_XLA = Settings(tolerance=1e-9, chatter_depth=1.0, backend="xla")
 
 
 def ours(workload, block: int, settings=FAST):
-    """The same workload in one batch call."""
+    """A function that runs a workload with jaxcam in one batch call."""
     system = CamFollower(speed=workload.speed[0])
     sweep = {}
     if np.ptp(workload.speed) > 0:

@@ -5,8 +5,8 @@
 
 The two workloads are those of `benchmarks.speed`. The bare loop is `stroboscope`, one
 call for all trajectories; the sweep also labels motions, finds the attractors and
-writes to disk. One pinned core, minimum CPU time of interleaved runs (wall time for the
-parts on two cores), tolerance 1e-9 on both sides.
+writes to disk. Times are minimum CPU times of interleaved runs on one pinned core (wall
+times for the parts on two cores), at a tolerance of 1e-9 on both sides.
 """
 
 import os
@@ -48,7 +48,7 @@ def states_at_145(side: int) -> Grid:
 
 
 def swept_to(work):
-    """The sweep with a new folder each time."""
+    """A call of the sweep that writes to a new folder each time."""
 
     def call():
         with tempfile.TemporaryDirectory() as folder:
@@ -173,7 +173,7 @@ def two_cores(side: int, repeats: int, on_cluster: bool) -> None:
     """Compare wall times on one and two cores, in a process that is not pinned.
 
     XLA creates as many threads as it finds cores when it starts. The first line is the
-    speed-up of the machine itself; the ratios of the single pairs of runs are in
+    speed-up of the machine itself; the ratios of the individual pairs of runs are in
     brackets.
     """
     with tempfile.TemporaryDirectory() as folder:

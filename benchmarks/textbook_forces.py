@@ -6,8 +6,8 @@ same Duffing oscillator below a stop are driven by a known multisine. Only the p
 is measured, with noise. Both methods get three recordings; a fourth is held out.
 
 - `jaxcam` gets a linear oscillator with tolerances, and `diagnose` finds what it lacks.
-- `pysindy` (optional: `pip install pysindy`) gets the settings whose free run of the
-  last of the three recordings is best, see `_textbook_sindy.py`. With a stop it is run
+- `pysindy` (optional: `pip install pysindy`) uses the settings with the best free run
+  of the last of the three recordings (see `_textbook_sindy.py`). With a stop, it is run
   twice: as it is, and with derivatives taken within flights and the true impact law.
 
 The error of the force is the rms error of the model's acceleration along the true

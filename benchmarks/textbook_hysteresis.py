@@ -1,10 +1,11 @@
-"""How much of a Bouc-Wen force can the hysteresis of the library represent?
+"""Measure how much of a Bouc-Wen force the hysteresis of the library can represent.
 
 Along the true motion of `_textbook_cases.py`, the internal state of a hysteresis is
 integrated for a grid of parameters, and its force is fitted together with a constant, a
-stiffness and a damping. The best point of the grid is then improved by the method of
-Nelder and Mead. Printed is what remains of the force that no linear oscillator has, as
-a fraction of its rms, for both kinds of hysteresis that a diagnosis tries.
+stiffness and a damping. The best point of the grid is then improved by the Nelder-Mead
+method. For both kinds of hysteresis that a diagnosis tries, the script prints the rms
+of the remaining part of the force that no linear oscillator has, as a fraction of the
+rms of that force.
 
     python -m benchmarks.textbook_hysteresis bouc_wen
 """

@@ -33,7 +33,7 @@ from jaxcam.parameters import as_arrays
 from jaxcam.sweeps import PoincareSection
 
 
-# returns a second that others have published for this benchmark
+# returns per second that others have published for this benchmark
 PUBLISHED = {
     "boost odeint, one core of an i7-4820K": 27e3,
     "MPGOS, Titan Black GPU": 4.0e6,

@@ -1,4 +1,4 @@
-"""The steps of many branches as one compiled program."""
+"""Take the steps of many branches in one compiled program."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from .step_control import measure_step
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
-# number of attempted steps in a call that reports progress, and in one that does not
+# number of attempted steps per call, with and without reports of progress
 _ROUNDS, _WHOLE = 16, np.iinfo(np.int64).max
 REASONS = (
     "running",
@@ -40,7 +40,7 @@ class Lane(NamedTuple):
 
 
 class Axes(eqx.Module):
-    """The parameters that differ between branches; static."""
+    """A static record of which parameters differ between branches."""
 
     tree: PyTree = eqx.field(static=True)
     """0 for each leaf that differs, None for each shared leaf."""
@@ -85,11 +85,11 @@ def follow_lanes(
 ):  # fmt: skip
     """Follow all branches to their ends.
 
-    **Arguments:** the problem, and an algorithm that predicts from one point;
-    parameters `given` to the problem, which differ between branches by `axes`, and the
-    `leaf` that is followed; for each branch a point `z` and the sign of its direction;
-    bounds; settings from `as_traced`; the maximum number of `points`; and `progress`,
-    which is called with the completed fraction, or None.
+    **Arguments:** the problem; an algorithm that predicts from one point; the
+    parameters `given` to the problem, and `axes`, which marks those that differ between
+    branches; the `leaf` that is continued; for each branch, a point `z` and the sign of
+    its direction; the bounds; settings from `as_traced`; the maximum number of
+    `points`; and `progress`, which is called with the completed fraction, or None.
 
     Returns:
         The last `Lane` of each branch.
@@ -140,7 +140,7 @@ def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
 def _advance(
     problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds,
 ):  # fmt: skip
-    """Take up to `rounds` attempted steps of each branch that has not ended."""
+    """Attempt up to `rounds` steps on each branch that has not ended."""
     width = high - low
 
     def advance(parameters, lane: Lane) -> Lane:

@@ -9,9 +9,9 @@ from ._program import correct, Corrected, evaluate
 from .problem import AbstractProblem
 
 
-# number of steps that are shortened because the parameter turns back
+# maximum number of times that the step is shortened because the parameter turns back
 _TURNED = 12
-# component of a tangent of length one along the parameter whose sign is certain
+# smallest parameter component of a unit tangent whose sign is reliable
 _SIDEWAYS = 1e-3
 
 
@@ -52,8 +52,8 @@ def leave(
     """Return the first point of a branch that leaves z along a tangent, and its
     distance, at most `step`.
 
-    The step is shortened if the parameter turns back within it, because no test
-    function is known at z that would show the fold there.
+    The step is shortened if the parameter turns back within it, because the values of
+    the test functions at z, which would reveal the fold, are not known.
     """
     settings = context.settings
     zero = np.zeros_like(z)

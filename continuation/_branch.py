@@ -121,7 +121,7 @@ def branch(
 
 
 def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:
-    """Return the points of an interrupted run, up to the last ordinary one."""
+    """Return the points of an interrupted run, up to the last regular point."""
     branch, before = read_branch(path, problem)
     different = [key for key, value in header.items() if before.get(key) != value]
     if different:

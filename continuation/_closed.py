@@ -12,9 +12,10 @@ from .problem import AbstractProblem
 from .special import cubic_between
 
 
-# the branch meets an earlier point if it comes this close to it, in step lengths, for
-# tolerances from 1e-11 to 1e-8; this allows for the errors of both points, and for
-# digits lost near a branch point, where the equations are nearly singular
+# the branch meets an earlier point if the distance from it, in step lengths, is at most
+# `_MISS` times the tolerance, limited to the range from `_LEAST` to `_MOST`; this
+# allows for the errors of both points, and for digits lost near a branch point, where
+# the equations are nearly singular
 _MISS, _LEAST, _MOST = 1e3, 1e-8, 1e-5
 # number of steps that must lie between a point and the return to it
 _AWAY = 3.0
@@ -84,7 +85,7 @@ class Past:
 def closed(
     context: Context, past: Past, current: Solution, following: Solution
 ) -> tuple[Solution, str] | None:
-    """Return the earlier point to which this step has returned, and what that means.
+    """Return the earlier point to which this step has returned, and why the run ends.
 
     A solution at which the equations are regular lies on only one branch. If a branch
     meets one of its points again, it is therefore a closed curve, or the same curve
@@ -129,7 +130,7 @@ def _cosine_where_met(
     chord = chord / np.linalg.norm(chord)
     guess = cubic_between(current.at, following.at, share) / scale
     target = passed.z / scale
-    # onto the plane that contains the earlier point
+    # move the guess onto the plane through the earlier point
     guess = (guess + chord * float(chord @ (target - guess))) * scale
     at: Any = correct(current.problem, context, guess, chord / scale, chord * scale)
     allowed = min(max(_MISS * context.settings.tolerance, _LEAST), _MOST)

@@ -30,7 +30,7 @@ from .special import (
 
 # `parameters` is a property, which type checkers interpret as an argument
 _monitored: Any = MonitorPoints
-# a monitor below this, relative to one plus the unknowns, counts as zero
+# a monitor below this, relative to one plus the largest unknown, counts as zero
 _ZERO = 1e-7
 
 

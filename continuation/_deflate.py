@@ -92,7 +92,7 @@ def deflate(
         values, success = jax.device_get(
             _deflated(
                 problem,
-                # away from the guess, because it may be a solution that is divided out
+                # start next to each guess, which may itself be a known solution
                 jnp.asarray(starts + 1e-6 * scale),
                 jnp.asarray(table),
                 jnp.asarray(len(solutions)),

@@ -6,7 +6,7 @@ from .special import BRANCH_POINT
 
 
 # an orbit has half the period if its halves differ by less than this, in step lengths;
-# their distance grows with a square root
+# the difference grows as the square root of the change of the parameter
 HALF = 1e-4
 JOINS = (
     "the branch rejoins the orbits of half the period at their flip; beyond it, the "
@@ -15,9 +15,9 @@ JOINS = (
 
 
 def joins(current: Solution, point: Point) -> bool:
-    """Return whether orbits of half the period take over.
+    """Return whether the branch rejoins the orbits of half the period here.
 
-    They form a separate branch, which is not followed a second time.
+    Those orbits form a separate branch, which is not followed a second time.
     """
     if point.kind != BRANCH_POINT:
         return False

@@ -45,8 +45,9 @@ class LimitCycle(AbstractProblem):
     basis: Any
     """Unit vectors in the plane, `(n, n-1)`."""
     steps: int = eqx.field(static=True)
-    """Number of equal steps per period, by the eighth-order Dormand-Prince method.
-    `point.observed["error"]` is their estimated error, relative to the state.
+    """Number of equal eighth-order Dormand-Prince steps per period.
+    `point.observed["error"]` is the largest estimated error of a step, relative to the
+    state.
     """
     stability: ClassVar[StabilityKind] = "map"
     """Multipliers on the unit circle mark bifurcations."""
@@ -108,7 +109,7 @@ class LimitCycle(AbstractProblem):
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "LimitCycle":
         x = np.asarray(u[:-1], float)
         f = np.asarray(self.vector_field(jnp.asarray(x), parameters))
-        # near a Hopf point the field vanishes, and the plane obtained there is used
+        # near a Hopf point, the field vanishes: keep the plane that was derived there
         if np.linalg.norm(f) < 1e-6 * max(1.0, float(np.linalg.norm(x))):
             return self
         normal, basis = _plane(f)

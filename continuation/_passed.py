@@ -18,7 +18,7 @@ from .special import (
 
 
 class Special(NamedTuple):
-    """A special point as a state of the run, and its data."""
+    """A special point: the solution there, and its data."""
 
     current: Solution
     kind: str
@@ -48,7 +48,7 @@ def sign_changes(context: Context, current: Solution, following: Solution) -> li
         before = current.tests.get(name, 0.0)
         if name in watched and before * after < 0:
             found.append(name)
-    # test functions that are not continuous at a corner change sign there as well
+    # branch points and corners first: discontinuous functions also change sign there
     first = {BRANCH_POINT, *corners(current, following)}
     return sorted(found, key=lambda name: name not in first)
 
@@ -98,9 +98,9 @@ def located_between(
 def special_here(
     context: Context, current: Solution, chord: np.ndarray, name: str, located: Located
 ) -> Special | None:
-    """Return the special point as a state of the run; None if it is not reported.
+    """Return the special point; None if it is not reported.
 
-    `chord` points along the branch there.
+    `chord` points along the branch at the special point.
     """
     problem = current.problem
     at = evaluate(problem, context, located.z, chord)

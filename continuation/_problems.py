@@ -156,7 +156,7 @@ class PeriodicPoints(AbstractRepresentation):
 
 @program
 def _mapped(problem: FixedPoint, u, tangent):
-    """Return the next point of an orbit and of a perturbation of it."""
+    """Return the next point of an orbit, and the image of a tangent."""
     return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
 
 

@@ -32,7 +32,9 @@ class Corrected(eqx.Module):
     linearisation: Float[Any, "k k"]
     tangent: Float[Any, " n1"]
     determinant: Any
-    """Sign and (n+1)-th root of the determinant of the Jacobian and tangent, scaled."""
+    """The (n+1)-th root of the modulus of the determinant of the scaled Jacobian,
+    bordered by the tangent, with the sign of that determinant.
+    """
     scale: Float[Any, " n1"]
     monitors: dict[str, Any]
     observed: dict[str, Any]
@@ -74,8 +76,8 @@ def newton(function, y, tolerance, max_iterations: int):
 
 
 def tangent_and_determinant(jacobian, scale, old):
-    """Return the unit tangent along `old` (all in z), and the determinant (thesis, eq.
-    3.33).
+    """Return the tangent in the direction of `old`, of unit length when scaled, and the
+    determinant (thesis, eq. 3.33).
     """
     scaled = jacobian * scale[None, :]
     old = old / scale
@@ -188,7 +190,7 @@ def correct(
 def _narrowed(at: Corrected, padded: Padded, problem: AbstractProblem) -> Corrected:
     """Return the results for the original unknowns of a padded problem."""
     kept = padded.positions(padded.kept.size + 1)
-    # the equations u = 0 of the additional unknowns contribute their scales
+    # the additional equations u = 0 multiply the determinant by the scales of u
     added = np.delete(at.scale, kept)
     root = np.abs(at.determinant)
     with np.errstate(divide="ignore"):
@@ -233,8 +235,8 @@ def _solve(problem, u, tolerance, max_iterations: int):
 
 
 def solve(problem, u, settings, iterations: int = 30):
-    """Solve a problem at its own parameters from a guess; return value, success and
-    residual.
+    """Solve a problem at its own parameters, starting from a guess; return the
+    solution, whether Newton's method converged, and the residual.
     """
     padded, u = problem.padded(), np.asarray(u)
     if padded is not None:

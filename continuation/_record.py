@@ -1,12 +1,12 @@
 """Store branches on disk: one line of JSON for each point, written immediately.
 
-Format, version 1: UTF-8 text with one JSON object per line. The first is the header,
-with `format` = "continuation branch", `version`, `parameter`, `parameters`, `leaf`,
-`bounds`, and any entries added by the writer. Each further line is a point, with the
-fields of `continuation.Point` except its problem. Numbers are written such that they
-are read back as the same 64-bit floats; non-finite numbers are strings; complex numbers
-are pairs; `observed` arrays have their `shape` and `dtype`. An incomplete last line is
-a point that was being written when the run was interrupted; it is ignored.
+Format, version 1: UTF-8 text with one JSON object per line. The first line is the
+header, with `format` = "continuation branch", `version`, `parameter`, `parameters`,
+`leaf`, `bounds`, and any entries added by the writer. Each further line is a point,
+with the fields of `continuation.Point` except its problem. Numbers are written so that
+they read back as the same 64-bit floats; non-finite numbers are strings; complex
+numbers are pairs; `observed` arrays have their `shape` and `dtype`. An incomplete last
+line is a point that was being written when the run was interrupted; it is ignored.
 """
 
 import json
@@ -30,7 +30,7 @@ class Recorder:
     """A callback that appends points to a file as they are found.
 
     **Arguments:** `path`: the file; `header`: entries of its first line in addition to
-    the format. With `after` (existing points), the file is rewritten up to them.
+    the format; `after`: existing points, with which the file is rewritten.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ def load_branch(
         A [`continuation.Branch`][].
 
     Raises:
-        ValueError: The file is not a branch, or has a later format version.
+        ValueError: The file does not contain a branch, or has a later format version.
 
     Examples:
         >>> import continuation

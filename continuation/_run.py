@@ -83,7 +83,7 @@ class Run:
             step /= 2
             if start.tangent is None or step < context.settings.min_step:
                 raise ValueError(f"the start is not admissible: {refusal}")
-            # the point has no label
+            # the rejected point must not use up a label
             self.label -= 1
         self.pending.append(point)
         self.past.add(problem, point)
@@ -150,8 +150,8 @@ class Run:
             current = self._with_fresh_references(following)
 
     def _advance(self, current: Solution) -> tuple[Solution | None, str]:
-        """Find the next point, and the reason if the branch ends there; None if it ends
-        before.
+        """Find the next point, or None if the branch ends before it; also return the
+        reason if the branch ends.
         """
         step, failures = current.step, 0
         while True:
@@ -184,7 +184,7 @@ class Run:
                     if back is not None:
                         return back
                     return following, attempted.bound
-            # a bend does not indicate an end, and long steps fail for other reasons
+            # a sharp bend does not indicate an end, and a failed long step need not
             last = step / 2 < self.context.settings.min_step
             failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
@@ -218,7 +218,7 @@ class Run:
             current.arclength + length,
             trail,
         )
-        # a value of exactly zero keeps the sign, which changes in the next step
+        # an exact zero keeps the previous sign, so that the next step changes it
         for name, value in following.tests.items():
             if value == 0:
                 before = current.tests.get(name, 0.0)
@@ -236,7 +236,7 @@ class Run:
     # Special points
 
     def _doubt(self, current: Solution, passed: list[tuple[str, Located]]) -> bool:
-        """Return whether the branch would end at a point that was not found."""
+        """Return whether the branch would end at a point that could not be located."""
         return any(
             self._ends(current, name) and not located.converged
             for name, located in passed
@@ -341,7 +341,7 @@ class Run:
         if type(current.problem).check is AbstractProblem.check:
             return ""
         point = self._point(current, "regular")
-        # it is only checked, and has no label
+        # the point is only checked and must not use up a label
         self.label -= 1
         return current.problem.check(point) or ""
 

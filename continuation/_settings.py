@@ -78,8 +78,8 @@ class BranchSettings(eqx.Module):
 
 
 _NOT_OF_A_BATCH = ("max_points", "special", "localise")
-"""Settings that a batch ignores. It has its own number of points, and special points
-are located when one of its branches is requested.
+"""Settings that a batch ignores: a batch has its own maximum number of points, and its
+special points are located when one of its branches is requested.
 """
 
 
@@ -87,8 +87,8 @@ def as_traced(settings: BranchSettings) -> BranchSettings:
     """Convert settings for a batch, whose compiled program does not check them.
 
     Numbers become arrays except `max_iterations`, which the corrector needs as a Python
-    integer; settings that a batch does not use have their defaults. Therefore only a
-    change of `max_iterations` requires another program.
+    integer; settings that a batch does not use are reset to their defaults. Therefore
+    only a change of `max_iterations` requires another program.
     """
     unused = {name: getattr(BranchSettings, name) for name in _NOT_OF_A_BATCH}
     settings = dataclasses.replace(settings, **unused)

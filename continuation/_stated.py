@@ -1,4 +1,4 @@
-"""Convert a system and its orbit, which `follow` accepts instead of a problem."""
+"""Convert a system and one of its orbits to a problem that `follow` can solve."""
 
 from typing import Any
 

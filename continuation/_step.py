@@ -27,8 +27,8 @@ class StepAttempt(NamedTuple):
     refusal: Refusal | None = None
     """Reason for rejecting the step."""
     solution: Corrected | None = None
-    """The solution, if the step is rejected only because it is far or in another
-    direction."""
+    """The solution, if the corrector converged but the step is rejected because the
+    correction is too long or the branch turns too sharply."""
 
 
 def attempt_step(
@@ -61,7 +61,7 @@ def attempt_step(
     normal[k] = 1.0 / a.scale[k]
     b = correct(problem, context, guess, normal, a.tangent)
     if b.success:
-        # rounding of the corrector
+        # remove the rounding error of the corrector
         z = np.array(b.z)
         z[k] = value
         b = with_field(b, "z", z)

@@ -25,8 +25,8 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     solves the algebraic branching equation (thesis, eq. 3.37); from a flip, the doubled
     orbit; from a Hopf point of a [`continuation.Equilibrium`][], the limit cycle.
 
-    **Arguments:** `width`: width of the parameter bounds, in which directions are
-    measured.
+    **Arguments:** `width`: width of the parameter bounds, the unit in which changes of
+    the parameter are measured.
 
     Raises:
         ValueError: No branch is known to emanate from the point.
@@ -96,7 +96,7 @@ def switch(
 
 @program
 def _quadratic(problem: AbstractProblem, leaf: int, z, basis, left):
-    """Return left . B(basis_i, basis_j) of G(u, parameter)."""
+    """Return left . B(basis_i, basis_j), with B the second derivative of G(u, p)."""
 
     def g(z):
         return problem.residual(z[:-1], with_leaf(problem.parameters, leaf, z[-1]))

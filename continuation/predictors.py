@@ -12,7 +12,7 @@ from jaxcam.parameters import AnyArray
 
 
 class Station(NamedTuple):
-    """A point passed, as used by predictors: lengths are scaled."""
+    """A point that the branch has passed, in scaled coordinates."""
 
     y: Float[AnyArray, " n+1"]
     """Scaled state and parameter, `(n+1,)`."""

@@ -8,13 +8,13 @@
 
 # # A1. Falling balls
 #
-# Several balls were dropped from a bridge and filmed at 15 frames per second, each of
-# them twice (de Silva et al. 2020, MIT licence). According to the textbook, all balls
+# Several balls were dropped from a bridge, each of them twice, and filmed at 15 frames
+# per second (de Silva et al. 2020, MIT licence). According to the textbook, all balls
 # fall in the same way. Do they?
 #
 # The recordings are not part of the package. Put them into the folder `real/ball_drop`,
 # and set the environment variable `JAXCAM_RECORDINGS` to the folder that contains
-# `real`. Without it this notebook prints a message and stops.
+# `real`. Without the recordings, this notebook prints a message and stops.
 
 # +
 import os
@@ -80,8 +80,8 @@ Console().print(comparison.table())
 
 # ## Figure
 
-# The upper panels show the heaviest ball and the lower panels the lightest. Grey marks
-# the noise.
+# The upper panels show the heaviest ball and the lower panels the lightest. Grey bands
+# show plus and minus two standard deviations of the noise.
 
 # +
 with style():

@@ -27,8 +27,8 @@
 # - `mounting_head`: Juloski, Heemels and Ferrari-Trecate 2004, without a licence.
 #
 # Put these five folders into a folder `real`, and set the environment variable
-# `JAXCAM_RECORDINGS` to the folder that contains `real`. Without it this notebook
-# prints a message and stops.
+# `JAXCAM_RECORDINGS` to the folder that contains `real`. Without the recordings, this
+# notebook prints a message and stops.
 
 # +
 import dataclasses
@@ -85,7 +85,7 @@ def terms(*without: str, center: float = References.spring_center, **options):
 
 
 def transferred(result: Diagnosis) -> tuple[float, float]:
-    """Return the rms residual of the last recording, predicted from the others.
+    """Return the rms residuals of the last recording, predicted from the others.
 
     The first value is without the added terms, the second with them.
     """
@@ -154,9 +154,9 @@ ask(
 # Five balls were each dropped twice from a bridge and filmed at 15 frames per second.
 # Gravity is known, so the model has no parameters. The noise of a film is not specified
 # anywhere; it is estimated from the scatter about a polynomial of degree 5 fitted to
-# each drop, and one value is used for all balls. The hand still holds the ball in the
-# first samples, so a recording begins after a tenth of the height of fall. Terms for
-# dry friction, springs and hinges are excluded, because a ball in the air has none.
+# each drop, and one value is used for all balls. In the first samples, the hand still
+# holds the ball, so the first tenth of the height of fall is omitted. Terms for dry
+# friction, springs and hinges are excluded, because a ball in the air has none.
 
 
 # +
@@ -214,12 +214,12 @@ for ball in sorted({run.name.rsplit("_drop", 1)[0] for run in drops}):
 # ## A marble on paper
 #
 # A glass marble falls onto stacks of 1 to 100 sheets of paper and is tracked at 200
-# frames per second. A pixel is 0.799 mm, known to a few per cent from the free fall,
-# and the centre of the marble is known to a quarter of a pixel. The track is followed
-# from frame to frame; drops in which it is lost are omitted. The hand disturbs the
-# first arc, which therefore begins after a tenth of the height of fall. The last arc,
-# in which the bounces are too low to be distinguished, and the samples at rest after it
-# are omitted.
+# frames per second. A pixel corresponds to 0.799 mm, a value known to a few per cent
+# from the free fall, and the centre of the marble is known to a quarter of a pixel. The
+# track is followed from frame to frame; drops in which the marble is lost are omitted.
+# The hand disturbs the beginning of the first arc, so the first tenth of the height of
+# fall is omitted. The last arc, in which the bounces are too low to be distinguished,
+# and the samples at rest after it are omitted.
 
 
 # +

@@ -11,13 +11,12 @@
 # A model is fitted to one whole recording and then simulates another one in a free run,
 # which uses only the first 20 samples and the measured input. The first line of each
 # result is for the textbook model; each further line adds a term that the diagnosis in
-# notebook A3 named. The textbook models are in
-# `textbook_models.py`.
+# notebook A3 identified. The textbook models are in `textbook_models.py`.
 #
 # The recordings are public; A3 lists their sources. Put the folders `pendulum`,
 # `positioning_stage` and `mounting_head` into a folder `real`, and set the environment
-# variable `JAXCAM_RECORDINGS` to the folder that contains `real`. Without it this
-# notebook prints a message and stops.
+# variable `JAXCAM_RECORDINGS` to the folder that contains `real`. Without the
+# recordings, this notebook prints a message and stops.
 
 # +
 import os
@@ -102,7 +101,7 @@ for way, (seen, unseen) in by_size.items():
 #
 # The protocol of the benchmark is followed: the parameters are fitted to the first
 # recording alone, and the second recording, which contains pulses, is then simulated in
-# a free run from 20 samples. Each line adds one term.
+# a free run that uses only its first 20 samples. Each line adds one term.
 
 # +
 estimation, pulses = read_stage(folder)
@@ -122,10 +121,10 @@ for label, more in steps.items():
     values |= fitted.values
 # -
 
-# Free-run predictions of the second recording deviate from it because its friction is
-# larger from the start, even before the first pulse: at the same position and speed,
-# the motor force is larger in both directions. No model fitted to the first recording
-# can predict this.
+# The free-run predictions deviate from the second recording because the friction in
+# that recording is larger from the start, even before the first pulse: at the same
+# position and speed, the motor force is larger in both directions. No model fitted to
+# the first recording can predict this.
 
 # +
 rate = np.gradient(estimation["position_m"], estimation.time)
@@ -144,7 +143,7 @@ print(f"before the first pulse: {np.mean(extra[early]):+.2f} N more")
 # recording, so its two halves are used.
 #
 # The second half is predicted from the first, and the first from the second, in free
-# runs from 20 samples.
+# runs that use only the first 20 samples.
 
 # +
 run, first, second = read_head(folder)

@@ -11,8 +11,9 @@
 # Between 136 and 152 rpm the rig of the thesis (chapter 5) has an orbit with one impact
 # per revolution of the cam. The orbit appears at a fold, where it coexists with the
 # orbit that sticks, and its period doubles at a flip. The implicit function theorem
-# gives the derivative of either speed with respect to any other parameter without
-# another continuation, and so shows, for example, the effect of a stiffer spring.
+# gives the derivatives of the fold speed and of the flip speed with respect to any
+# other parameter, without another continuation. These derivatives show, for example,
+# the effect of a stiffer spring.
 
 # +
 import equinox as eqx

@@ -11,9 +11,9 @@
 # This notebook illustrates the main result of the thesis (chapter 6). Below 152.67 rpm
 # the follower completes its chatter once per revolution, sticks to the cam and is
 # released, so every revolution is the same. Above this speed the release comes before
-# the chatter is complete. There is no more sticking, and the motion becomes chaotic at
-# once, without a period doubling. `docs/chatter.md` explains the theory; this notebook
-# draws its maps.
+# the chatter is complete. The follower then does not stick, and the motion becomes
+# chaotic at once, without a period doubling. `docs/chatter.md` explains the theory;
+# this notebook draws its maps.
 
 # +
 import equinox as eqx
@@ -50,8 +50,9 @@ rig = preset("calibrated")
 # ## The interruption of chatter
 #
 # At the interruption, the impacts accumulate exactly at the release, and the sticking
-# time falls to zero. It is no smooth function of the speed there, so we do not search
-# for its zero but for that of a smooth function, the margin (see `docs/chatter.md`).
+# time falls to zero. The sticking time is not a smooth function of the speed there. We
+# therefore search for the zero of a smooth function instead, the margin (see
+# `docs/chatter.md`).
 
 bracket = (rpm_to_rad_s(150.0), rpm_to_rad_s(154.0))
 critical = continuation.chatter_interruption(rig, speed, bracket)

@@ -50,10 +50,10 @@ hinge = [
 
 
 def read_swings(folder: Path) -> list[Segments]:
-    """Read the swings of the pendulum, each until the pendulum stops.
+    """Read the swings of the pendulum, each up to the time at which the pendulum stops.
 
     Every tenth sample is kept: 10 ms is an eightieth of the period, and at 1000 samples
-    per second the rounding errors of neighbouring samples are the same.
+    per second the rounding errors of neighbouring samples would be the same.
     """
     swings = []
     for run in read_case(folder / "pendulum", channels=("angle_rad",)):
@@ -124,7 +124,7 @@ spring = [
 
 
 def read_head(folder: Path) -> tuple[Recording, Recording, Recording]:
-    """Read the recording of the mounting head: the whole and its two halves."""
+    """Return the recording of the mounting head, and its two halves."""
     (run,) = read_case(folder / "mounting_head", channels=("position_m",))
     first, second = (
         slower(run, "position_m", "voltage_V", 8, half)

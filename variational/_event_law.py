@@ -99,7 +99,7 @@ def contact_projector(
     """
     out = jax.jacfwd(lambda y: onto_contact(system, t, y, contact))(x)
     if x.shape[0] == 2:
-        # exactly zero, because rounding divided by a small impact speed would not be
-        # zero
+        # exactly zero, because a rounding error divided by a small impact speed would
+        # be large
         out = jnp.where(jnp.any(contact), jnp.zeros_like(out), out)
     return out

@@ -1,8 +1,8 @@
 """Compute Lyapunov exponents of a motion with impacts.
 
-The event loop is differentiated attempt by attempt, and a frame of tangent vectors is
-orthonormalised after each. If the LLVM backend lacks an operation, the flow is
-differentiated period by period instead.
+The event loop is differentiated one attempted step at a time, and a frame of tangent
+vectors is orthonormalised after each. If the LLVM backend lacks an operation, the flow
+is differentiated period by period instead.
 """
 
 from collections.abc import Callable
@@ -169,7 +169,7 @@ def _by_xla(batched, states, given, turns: int, told: Callable, summary: Callabl
 
 
 def _check_system(batched, shared, t0, states, settings) -> None:
-    """Raise `ValueError` for the system of the first motion."""
+    """Raise `ValueError` if the system of the first motion is invalid."""
     if not len(states):
         raise ValueError("there are no motions; give at least one state")
     first = eqx.combine(jax.tree.map(lambda leaf: leaf[0], batched), shared)
@@ -221,7 +221,7 @@ def _by_turns(
 
 
 def _padded(lanes: int) -> int:
-    """Return the number of motions with which all blocks have the same size."""
+    """Return the number of motions, padded so that all blocks have the same size."""
     count = -(-lanes // _BLOCK)
     return count * -(-lanes // count)
 
@@ -242,7 +242,7 @@ def _in_turn(some: Callable, batched, states):
     parts = [
         some(jax.tree.map(lambda leaf, k=k: leaf[k], batched), states[k]) for k in order
     ]
-    # all have the same period length if nothing else differs
+    # a period of shape (1,) is common to all motions
     alike = parts[0].turn.shape[0] == 1
     whole = jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:lanes], *parts)
     return eqx.tree_at(lambda m: m.turn, whole, parts[0].turn) if alike else whole
@@ -251,8 +251,8 @@ def _in_turn(some: Callable, batched, states):
 def _summary(seen: Seen, status, length, transient, blocks):
     length = np.asarray(length)
     with np.errstate(invalid="ignore"):
-        # the difference of two infinities: the motion stuck before and during this
-        # period
+        # NaN, the difference of two infinities, where the motion stuck both before and
+        # during a period
         local = np.diff(seen.logs[:, transient:], axis=1) / length[:, None, None]
     stuck = np.isneginf(seen.logs[:, transient + 1 :])
     local = np.where(stuck & np.isnan(local), -np.inf, local)
@@ -302,7 +302,7 @@ def _lanes(system, state, where, values):
     return batched, shared, state
 
 
-# number of motions in one program, so that waiting times are short
+# number of motions run together; all of them wait for the slowest one
 _BLOCK = 128
 
 

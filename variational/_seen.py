@@ -4,7 +4,7 @@ import numpy as np
 
 
 class Seen:
-    """Sums of the logarithms and numbers of impacts at the end of each period."""
+    """Sums of logarithms of growth and numbers of impacts at the ends of periods."""
 
     def __init__(self, lanes: int, stops: int, n: int):
         self.logs = np.full((lanes, stops, n), np.nan)
@@ -15,11 +15,11 @@ class Seen:
 
     @staticmethod
     def of(logs, hits, states) -> "Seen":
-        """Return values at the ends of all periods, as a whole."""
+        """Return an instance that contains the values of all periods."""
         lanes, stops, n = logs.shape
         seen = Seen(lanes, stops + 1, n)
         seen.logs[:, 1:], seen.hits[:, 1:] = logs, hits
-        # the last one that was reached
+        # the last period that was reached
         reached = np.isfinite(hits).sum(axis=1) - 1
         seen.states[:] = states[np.arange(lanes), reached]
         return seen
@@ -27,7 +27,7 @@ class Seen:
     @property
     def share(self) -> float:
         """Return the fraction of periods completed, over all motions."""
-        # the first is the start of the run
+        # the first entry is the start of the run
         done, most = self._filled - 1, self.logs.shape[1] - 1
         return float(np.mean(np.minimum(done, most))) / most
 

@@ -90,7 +90,7 @@ def switching_saltation(
 def _in_mode(system: SwitchedSystem, sides, x) -> InMode:
     """Return the system on these sides, sliding where a side is zero."""
     every = tuple(range(x.shape[0]))
-    # whether it slides must be known while tracing
+    # whether the motion slides must be known while tracing
     held = [not is_traced(side) and side == 0 for side in sides]
     changed = tuple(every if slides else () for slides in held)
     flat: Bool[Array, " m"] = jnp.zeros((0,), bool)

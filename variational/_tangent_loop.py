@@ -10,7 +10,7 @@ from jaxcam.hybrid.batch import Horizon, Lanes, run_tangents, Table
 from jaxcam.hybrid.codes import RowKind
 
 
-# numbers in the table of a group of motions
+# maximum number of entries in the table of a group of motions
 _MOST = 2**24
 
 

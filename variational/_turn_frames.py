@@ -11,9 +11,9 @@ from jaxcam.hybrid import flow
 from jaxcam.hybrid.programs import program
 
 
-# growth over a period, relative to that of other vectors, that rounding hides
+# growth over a period, relative to that of other vectors, below which rounding hides it
 _HIDDEN = 1e-12
-# periods between two checks from Python
+# number of periods run in one call from Python
 TURNS = 16
 
 
@@ -63,7 +63,7 @@ def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnF
             matrix, made = jax.jacfwd(end, has_aux=True)(carry.state)
             columns = elementwise_product(matrix, carry.frame)
             frame, growth = orthonormal(columns)
-            # what is left of a column after the projection may be rounding
+            # after the projection, the rest of a column may be only rounding error
             before = jnp.sqrt(jnp.sum(columns * columns, axis=0))
             hidden = (growth > 0) & (growth < _HIDDEN * before)
             growth = jnp.where(hidden, jnp.nan, growth)
@@ -88,7 +88,7 @@ def elementwise_product(a, b):
 
 
 def orthonormal(matrix: Float[Array, "n n"]):
-    """Orthonormalise columns (Gram-Schmidt); return them and the previous lengths.
+    """Orthonormalise columns (Gram-Schmidt); also return their lengths before scaling.
 
     A column of zeros remains zero.
     """

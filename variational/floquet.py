@@ -143,7 +143,7 @@ def test_functions(
     )
 
 
-# pytest would collect it
+# otherwise, pytest would collect the function as a test
 test_functions.__test__ = False  # pyright: ignore[reportFunctionMemberAccess]
 
 

@@ -28,12 +28,13 @@ from ..problem import Start
 from ._shooting import ImpactingOrbits
 
 
-# number of impacts of the first orbit from release to release
+# maximum number of impacts of the first orbit from release to release
 _MOST = 48
-# ratio of its slowest to its fastest rebound; slower impacts would be below the
-# tolerance
+# minimum ratio of the slowest to the fastest rebound of this orbit; slower impacts
+# would be below the tolerance
 _SLOWEST = 1e-3
-# distances to try: the width of the bounds times powers of 2
+# distances to try are the width of the bounds times powers of 2: lowest exponent, and
+# maximum number of trials
 _NEAREST, _TRIALS = -40, 4
 
 
@@ -105,7 +106,7 @@ def _closed_up(
     periods: int, point: Any, value: float, rows, sense: float, width: float
 ) -> Start | None:
     """Return the periodic orbit near the motion from release, and its tangent."""
-    # a JAX array, because its period is evaluated outside of a program
+    # a JAX array, because the forcing period is evaluated outside of a program
     moved = jnp.asarray(value, jnp.float64)
     parameters = with_leaf(point.problem.parameters, point.leaf, moved)
     count = len(rows)
@@ -126,8 +127,8 @@ def _closed_up(
         return None
     if not np.all(np.isfinite(at.tangent)):
         return None
-    # x grows with the parameter for a multiplier below one, and with its decrease for
-    # one above; the other multipliers are close to zero
+    # x grows as the parameter increases if the dominant multiplier is below one, and as
+    # it decreases if that multiplier is above one; the others are close to zero
     one = np.eye(at.linearisation.shape[0])
     away = sense * float(np.sign(np.linalg.det(one - at.linearisation)))
     tangent = at.tangent * (away or 1.0)

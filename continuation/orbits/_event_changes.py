@@ -21,10 +21,11 @@ _COUNTED = ("impacts", "contacts", "crossings", "slides")
 
 
 def monitors_of_events() -> dict[str, Monitor]:
-    """Return two monitors for each number of events, and one for each part of the mode.
+    """Return two monitors for each kind of event, and one for each part of the mode.
 
-    The first changes sign if one event is added or removed, the second if two are. The
-    mode at the start changes where an event passes through the start of the period.
+    Of the two, the first changes sign if one event is added or removed, the second if
+    two are. The mode at the start of the period changes where an event passes through
+    the start.
     """
     names = [name for one in _COUNTED for name in (one, f"pairs of {one}")]
     names += [f"{part} at the start" for part in _MODE]
@@ -69,12 +70,12 @@ def name_of_change(
     before: list[tuple[float, Event]], after: list[tuple[float, Event]]
 ) -> str | None:
     """Return the name of the bifurcation between two sequences of events, or None if
-    they are the same orbit seen from another phase.
+    they belong to the same orbit, started at another phase.
 
     - `"grazing"`: the orbit touches a constraint or a switching surface, which adds an
       impact or two crossings.
     - `"grazing-sliding"`: it touches a surface, and slides there.
-    - `"crossing-sliding"`: it slides where it crossed.
+    - `"crossing-sliding"`: a crossing of a surface becomes sliding along it.
     - `"switching-sliding"`: it crosses a surface before it slides there.
     - `"adding-sliding"`: it leaves the surface for a moment during sliding.
 
@@ -111,8 +112,8 @@ def _rotated(first: list[Event], second: list[Event]) -> bool:
 
 
 def _briefest(events: list[tuple[float, Event]]) -> str:
-    """Return which of `"slide"` and `"leave"` begins the shortest interval between the
-    two.
+    """Return which of the events `"slide"` and `"leave"` begins the shortest interval
+    between two such events.
     """
     pairs = [
         (later - time, event.kind)

@@ -34,7 +34,7 @@ class ImpactSequences(AbstractRepresentation):
         problem = self.problem
         if not (problem.periods and problem.constraints):
             return states
-        # a motion repeats after whole forcing periods
+        # a motion repeats after a whole number of forcing periods
         phases = np.zeros(u.size)
         phases[:: 1 + problem.dimension] = 1.0
         return states + np.round(u[0] - states[:, :1]) * phases

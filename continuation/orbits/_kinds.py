@@ -1,7 +1,7 @@
 """Find a kind of orbits by name.
 
-Orbits with impacts lead to orbits that stick, and the reverse; with this table, the
-file of the former does not need that of the latter.
+Branches of orbits with impacts continue as orbits that stick, and vice versa; with this
+table, the module of the former need not import that of the latter.
 """
 
 from collections.abc import Callable

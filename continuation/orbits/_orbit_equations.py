@@ -96,7 +96,8 @@ class AbstractOrbits(AbstractProblem):
 
         The observed quantities are the period (s), the time (s) and state after the
         first impact, the integration error, the scale of the gaps in their units and,
-        with forcing, the states at whole forcing periods, `(periods, n)`.
+        with forcing, the states at integer multiples of the forcing period,
+        `(periods, n)`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -148,7 +149,7 @@ class AbstractOrbits(AbstractProblem):
 class PaddedOrbits(AbstractOrbits):
     """Orbits with any number of impacts up to the number of rows.
 
-    Only compiled programs use this problem; the others are those of
+    Only compiled programs use this problem; everywhere else, the problem is a
     [`continuation.ImpactingOrbits`][].
     """
 

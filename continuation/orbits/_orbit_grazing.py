@@ -52,8 +52,7 @@ def orbit_grazing(problem: Any, point: Any) -> Start | None:
     zero = min(values, key=values.__getitem__)
     speeds = [w for w in values if w.what == "speed"]
     slowest = min(speeds, key=values.__getitem__, default=zero)
-    # next to an impact of zero speed, the gap also has its minimum: the impact is
-    # removed
+    # at an impact of zero speed, the minimum of the gap is also zero: remove the impact
     if values[slowest] <= 1e-7 * (1.0 + float(jnp.max(jnp.abs(u)))):
         zero = slowest
     number = zero.number
@@ -82,8 +81,8 @@ def _direction(
 ) -> np.ndarray | None:
     """Return the direction of the branch in which a monitor grows.
 
-    It uses the program of the continued branch; differences are sufficient, because
-    only the sign of the slope matters.
+    The slope is a difference, computed with the compiled program of the continued
+    branch; this is sufficient, because only the sign of the slope matters.
     """
     z = np.append(u, point.parameter)
     one = np.ones_like(z)

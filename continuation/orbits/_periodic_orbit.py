@@ -37,7 +37,7 @@ _SAME = 1e-7
 _SAME_TIME = 1e-9
 """Two times are equal if they differ by less than this fraction of the period."""
 _SHORT = 1e-6
-"""Part of a period over which the direction of the motion is taken."""
+"""Fraction of a period over which the direction of the motion is computed."""
 _CLOSED = 1e-9
 """A gap below this, relative to its size, counts as closed."""
 
@@ -222,7 +222,7 @@ def _dimension(system) -> int:
 
 
 def _by_shooting(system, guess, length, number, t0, settings):
-    """Find the orbit with the impacts of the motion from the guess, or the reason."""
+    """Find the orbit with the impacts of the motion from the guess, or why it fails."""
     turn = simulate(system, guess, t0, float(t0) + length, settings=settings)
     if not bool(turn.successful):
         return None, turn.result
@@ -286,7 +286,7 @@ def _touches(system, state, t0, length) -> bool:
 
 
 def _by_flow(system, guess, length, number, t0, settings):
-    """Apply Newton's method to the motion over one period, by the event loop."""
+    """Apply Newton's method to the map over one period, computed by the event loop."""
     start, end = jnp.asarray(float(t0)), jnp.asarray(length)
     state, found, success = _root(system, guess, start, end, settings, number == 0)
     if not bool(success):
@@ -341,7 +341,7 @@ def _at(equations: Shooting, u, system, t0):
     last = int(np.argmin(ago))
     begin = starts[last, 0]
     if ago[last] < same:
-        # t0 is the time of an impact, so half a flight later is used
+        # t0 is the time of an impact: use the middle of the next flight instead
         time = begin + (ends[last] - begin) / 2
         t0 = t0 + (time - begin)
     else:

@@ -35,9 +35,10 @@ from ._watched import INTERRUPTION, STICKS
 
 
 CHATTER = "chatter margin"
-"""Names of the monitors."""
+"""Name of the monitor that is zero at an interruption."""
 DETACHMENT = "jerk at release"
-# number of eighth-order Runge-Kutta steps in a part of one forcing period
+"""Name of the monitor that is zero at the detachment point."""
+# number of eighth-order Runge-Kutta steps from the last impact to a sampling time
 _STEPS = 64
 # largest number of impacts between release and the end of a period
 _IMPACTS = 2000
@@ -58,9 +59,9 @@ class StickingOrbits(AbstractProblem):
         as a test function: it falls to zero as a power of the distance from this
         interruption and does not change sign (thesis, section 3.5.1). The margin is
         smooth.
-    - the rate of change of the contact acceleration at release, relative to the forcing
-        period. It is zero at the detachment point (valve float), where release and the
-        next return to contact coincide; beyond that point, contact never ends.
+    - the rate of change of the contact acceleration at release, with time measured in
+        forcing periods. It is zero at the detachment point (valve float), where release
+        and the next return to contact coincide; beyond that point, contact never ends.
 
     Beyond a zero of the first monitor, a branch continues with
     [`continuation.ImpactingOrbits`][] if `beyond` is set.
@@ -131,8 +132,8 @@ class StickingOrbits(AbstractProblem):
         """Return the monitors and the observed quantities.
 
         The observed quantities are the period, the release, accumulation and sticking
-        times (s), the number of impacts, and the states at whole forcing periods,
-        `(periods, 2)`.
+        times (s), the number of impacts, and the states at integer multiples of the
+        forcing period, `(periods, 2)`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -190,7 +191,7 @@ class StickingOrbits(AbstractProblem):
 
 
 def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n"]:
-    """Return the states at the first whole periods after release."""
+    """Return the states at the first integer multiples of the period after release."""
     period = system.period
     first = jnp.ceil(turn.frame.release / period)
 
@@ -200,8 +201,8 @@ def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n
         after = (point.time, point.state, point.speed)
         return (time, state), after, point.found, count + 1
 
-    # a complete sequence has no end, but `end` is then before its accumulation, unless
-    # that is not a number
+    # complete chatter never ends the loop by itself, but here `end` precedes the
+    # accumulation time, unless the latter is NaN
     begin = (turn.frame.release, turn.frame.state)
     start = (begin, (*begin, jnp.zeros(())), jnp.asarray(True), 0)
 

@@ -7,11 +7,11 @@ from jaxtyping import Float
 
 
 def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
-    """Return state and tangent of the orbit traversed twice, with opposite
-    deviations.
+    """Return the state and tangent of the orbit traversed twice, with opposite
+    deviations in the two traversals.
     """
     if not problem.constraints:
-        # only the state at time zero
+        # the only unknown is the state at time zero
         return u, deviation
     shape = (len(problem.constraints), 1 + problem.dimension)
     first, moved = u.reshape(shape).copy(), deviation.reshape(shape).copy()

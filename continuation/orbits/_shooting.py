@@ -184,7 +184,7 @@ class ImpactingOrbits(AbstractOrbits):
         Returns:
             The name.
         """
-        # results for two numbers of steps differ by the integration error
+        # the number of steps is omitted, because it only changes the integration error
         return f"impacts {constraints} periods {self.periods}"
 
     @property

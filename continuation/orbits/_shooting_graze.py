@@ -18,8 +18,8 @@ from ._watched import Watched
 
 
 # speed below which an impact counts as grazing, relative to one plus the largest
-# component of the state: a located grazing point is below it, and a matrix divided by
-# that speed contains only rounding errors
+# component of the state: located grazing points are below it, and a matrix divided by
+# such a speed contains only rounding errors
 _NO_SPEED = 1e-8
 ONE = (
     "an impact has zero speed here: one multiplier is infinite, which is the limit "

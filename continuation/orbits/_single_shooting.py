@@ -24,7 +24,7 @@ from ._event_changes import (
 )
 
 
-# part of a period over which the direction of the motion is taken
+# fraction of a period over which the direction of the motion is computed
 _SHORT = 1e-6
 
 
@@ -175,7 +175,7 @@ class SingleShooting(AbstractProblem):
 
         The observed quantities are the period (s), the time (s) and the state at the
         start of the period, the number of impacts and, with forcing, the states at
-        whole forcing periods after that time, `(periods, n)`.
+        integer multiples of the forcing period after that time, `(periods, n)`.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -264,7 +264,7 @@ class SingleShooting(AbstractProblem):
 
 
 def _of_jax(leaf):
-    """Return an array of NumPy, as branches vary it, as one of JAX."""
+    """Convert a NumPy array, such as a parameter varied by a branch, to a JAX array."""
     return jnp.asarray(leaf) if isinstance(leaf, np.ndarray) else leaf
 
 

@@ -45,7 +45,7 @@ def monitors_of(impacts: int) -> dict[str, Monitor]:
     def monitor(one: Watched) -> Monitor:
         if one.what == "gap":
             return Monitor("grazing", ends=True)
-        # so are the gaps of the flights next to an impact of zero speed
+        # where an impact has zero speed, the gaps of the adjacent flights are zero too
         beside = ((one.number - 1) % impacts, one.number)
         names = tuple(Watched("gap", k).name for k in beside)
         return Monitor("grazing", ends=True, vanishing=names)

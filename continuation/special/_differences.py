@@ -6,7 +6,7 @@ import numpy as np
 
 
 STEPS = 8
-"""Distances, each half of the previous one."""
+"""Number of distances, each half of the previous one."""
 
 
 def along(

@@ -24,7 +24,7 @@ class AbstractExtended(AbstractProblem):
     them.
     """
     width: eqx.AbstractVar[Array]
-    """Bounds of the parameter that is an unknown."""
+    """Width of these bounds."""
     stability: ClassVar[StabilityKind] = "none"
     normal_forms: ClassVar[bool] = False
     detects: ClassVar[bool] = False
@@ -56,7 +56,7 @@ class AbstractExtended(AbstractProblem):
         return self.base.check(replace(inner, tests=tests))
 
     def monitor_of_base(self, name: str) -> str:
-        """Return the name of a monitor of the inner problem in the extended one."""
+        """Return the name of a monitor of the inner problem in the extended problem."""
         return name
 
 

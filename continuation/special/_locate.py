@@ -26,7 +26,7 @@ from ._test_functions import (
 _singular: Any = SingularPoints
 
 
-# a monitor that is not below this fraction of its values nearby jumps
+# a monitor jumps if, at its located zero, it exceeds this fraction of nearby values
 _JUMP = 1e-6
 
 
@@ -173,7 +173,7 @@ def _between_branches(
     b: Corrected,
     guess: np.ndarray,
 ) -> Located:
-    """Find the branch point near the end of the bracketing."""
+    """Find the branch point near the point at which bracketing ended."""
     z, success = differenced_crossing(problem, context, guess)
     if success and _inside(z, a.z, b.z, a.scale):
         return Located(z, True, "")
@@ -226,8 +226,8 @@ def ahead(
     """Find the zero of a monitor within `reach` ahead of a point of the branch, if any.
 
     This is for monitors that do not change sign, or that end the branch: the solution
-    may not exist at or beyond the zero, which is approached from this side, level by
-    level.
+    may not exist at or beyond the zero. The zero is therefore approached from this
+    side, level by level.
     """
     z, level, failures = a.z, value, 0
 
@@ -246,7 +246,7 @@ def ahead(
         target = level * (0.1 if failures == 0 else 0.5)
         found, success, near = reached(target)
         if near:
-            # the remaining distance, at the limit of resolution
+            # the remaining distance to the zero, by linear extrapolation
             rest = target / (level - target) * (found - z)
             z, level = found, target
             if float(np.linalg.norm(rest / a.scale)) <= context.settings.tolerance:

@@ -19,7 +19,7 @@ from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
-# largest displacement of a component of a state or phase for differences
+# largest displacement of a state component or phase for finite differences
 _REACH = 2.0**-7
 
 
@@ -73,7 +73,7 @@ class _Derivatives:
         y = jax.eval_shape(
             lambda u: self.problem.local_dynamics(u, self.parameters).at, self.u
         )
-        # as many as for differences, so that the same program is used
+        # as many displacements as for differences, so that the same program is used
         return self._jacobians(np.zeros((2 * STEPS + 1, y.size)))[0]
 
     def b(self, x, y, of_residual: bool = False):
@@ -103,7 +103,7 @@ class _Derivatives:
 
     def _c(self, a, b, c) -> np.ndarray:
         if self.problem.costly:
-            # polarised, because differences are along one line
+            # by polarisation, because differences give derivatives along one line only
             if np.array_equal(a, b):
                 return self._along(a)[1] @ c
             return (self._along(a + b)[1] - self._along(a - b)[1]) @ c / 4
@@ -177,8 +177,8 @@ def flip_direction(linearisation: np.ndarray) -> np.ndarray:
 
 
 def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Return the coefficient a of x' = a x^2 or x -> x + a x^2, and the side of the
-    branch.
+    """Return the coefficient a of x' = a x^2 or x -> x + a x^2, and the side on which
+    the branch lies.
     """
     n, jacobian, problem = at.jacobian.shape[0], at.jacobian, d.problem
     right, left = null_vectors(jacobian[:, :n])

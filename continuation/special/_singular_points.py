@@ -25,7 +25,7 @@ from ._multilinear import second, third
 from ._test_functions import FLIP, FOLD, has_own_dynamics, HOPF, NEIMARK_SACKER
 
 
-# pairs of eigenvalues other than the critical one are monitored up to this dimension
+# pairs of noncritical eigenvalues are monitored up to this dimension
 _LARGEST_FOR_PAIRS = 8
 
 
@@ -154,7 +154,7 @@ class SingularPoints(AbstractExtended):
             names["opposite"] = "1:2 resonance"
             names["third"] = "1:3 resonance"
             names["fourth"] = "1:4 resonance"
-        # beyond these the pair is real, and the points are neutral saddles
+        # beyond these points, the pair is real, and the points are neutral saddles
         last = ("double", "opposite") if self.kind in (HOPF, NEIMARK_SACKER) else ()
         found = {k: Monitor(v, ends=k in last) for k, v in names.items()}
         for name, monitor in self.base.monitors().items():

@@ -14,7 +14,7 @@ grid = sweeps.Grid((-3.0, -2.5), (0.0, 2.5), (32, 32))
 walls = np.linspace(0.0, 0.4, 9)
 found = sweeps.follow_basins(system, "wall", walls, grid, turns=200)
 
-# each attractor has its name where its basin is largest; small basins share one band
+# label each attractor where its basin is largest; small basins share one band
 large = found.shares.max(axis=0) > 0.03
 names = found.names[found.shares.argmax(axis=0), np.arange(len(large))]
 bands = [*found.shares.T[large], found.shares.T[~large].sum(axis=0)]

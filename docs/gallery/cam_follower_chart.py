@@ -18,7 +18,7 @@ def intercept(s):
     return s.restitution.intercept
 
 
-# speed (rpm), a state near the orbit, and the kinds of point at which its branch ends
+# speed (rpm), a state near the orbit, and the kinds of special point on its branch
 orbits = [
     (145.0, [0.4245, 1.8281], ("fold", "flip")),
     (145.0, None, ("detachment", "interruption of chatter")),

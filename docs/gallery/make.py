@@ -1,7 +1,7 @@
 """Draw the gallery: `python docs/gallery/make.py [NAME ...]`, all figures by default.
 
-Each script in this folder makes one `figure`; the first sentence of its docstring is
-the caption. This program writes a light and a dark picture of each, and
+Each script in this folder makes one `figure`; the first paragraph of its docstring is
+the caption. This program writes a light and a dark picture of each figure and the page
 `docs/gallery.md`.
 """
 
@@ -26,9 +26,9 @@ from jaxcam.plotting import on_dark, style
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "gallery.md"
 OUT = HERE
-# of the figures on the page, from top to bottom
+# names of the figures, in the order in which the page shows them
 ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
-# where the name of a script is not a good title
+# titles of the figures whose script names are not good titles
 TITLES = {
     "cam_follower_chart": "Cam-follower chart",
     "curves_in_two_parameters": "Bifurcation curves in the plane of two parameters",
@@ -78,7 +78,7 @@ _PART = """
 
 
 def caption(name: str) -> str:
-    """The first sentence of a script, on one line."""
+    """Return the caption of a script, on one line."""
     words = ast.get_docstring(ast.parse((HERE / f"{name}.py").read_text("utf-8")))
     assert words, f"{name}.py has no docstring"
     return " ".join(words.split("\n\n")[0].split())
@@ -100,7 +100,7 @@ def _write(figure: Figure, path: Path) -> None:
 
 
 def page() -> str:
-    """The text of `docs/gallery.md`."""
+    """Return the text of `docs/gallery.md`."""
     parts = {
         name: dict(
             name=name,

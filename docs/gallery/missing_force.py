@@ -14,7 +14,7 @@ from jaxcam.recordings import record, segment
 
 
 class Swing(jaxcam.HybridSystem):
-    """A pendulum with a polynomial force, to be fitted, and with air drag."""
+    """A pendulum with air drag and with a polynomial force, which is to be fitted."""
 
     stiffness: float = 140.0
     first: float = 0.0

@@ -24,7 +24,7 @@ circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 after = jax.vmap(lambda x: flow(system, x, 0.0, end).state)(start + circle)
 there = flow(system, start, 0.0, end).state
 
-# the same to first order: flight, saltation matrix, flight
+# the final perturbations to first order: flight, saltation matrix, flight
 ball = ImpactOscillator(omega=2.0, restitution=0.7, wall=9.0, damping=0.0)
 fly = jax.jacfwd(lambda x, t0, t1: flow(ball, x, t0, t1).state)
 time = float(hit.time[0])

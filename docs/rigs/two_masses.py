@@ -1,4 +1,6 @@
-"""Two sprung masses: the first hits a wall, and the shaken second hits the first."""
+"""Two sprung masses: the first hits a wall, and the second, which is shaken, hits the
+first.
+"""
 
 import jax.numpy as jnp
 
@@ -6,7 +8,7 @@ from jaxcam.hybrid import HybridSystem
 
 
 class TwoMasses(HybridSystem):
-    """The wall is at `x1 = 0`, and the masses touch if `x2 = x1`."""
+    """The wall is at `x1 = 0`, and the masses touch when `x2 = x1`."""
 
     state_names = ("x1", "v1", "x2", "v2")
     state_units = ("m", "m/s", "m", "m/s")

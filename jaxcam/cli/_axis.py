@@ -16,9 +16,9 @@ class Axis(NamedTuple):
 
     parameter: str
     unit: float
-    """One command-line unit, in SI units."""
+    """The unit used on the command line, in SI units."""
     symbol: str = ""
-    """The unit itself, if it is known."""
+    """Symbol of this unit, if it is known."""
 
     @staticmethod
     def of(

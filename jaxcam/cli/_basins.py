@@ -106,8 +106,8 @@ def _count(made) -> int:
 
 
 def _entropy(made, shape) -> dict | None:
-    """Compute the boundary entropy over the varying components; None on a coarse
-    grid.
+    """Compute the basin entropies over the varying components; None if the grid is too
+    coarse.
     """
     from ..sweeps import basin_entropy
 

@@ -23,7 +23,7 @@ def beside(
     if folder is None:
         yield lambda: None
         return
-    # a fork would share the threads of a compiler that is already running
+    # a fork is unsafe, because the threads of the compiler are already running
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=context) as pool:
         running = pool.submit(work, folder)

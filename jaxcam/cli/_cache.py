@@ -21,7 +21,8 @@ def keep_compiled_programs() -> None:
         except (OSError, RuntimeError):
             return
         jax.config.update("jax_compilation_cache_dir", str(folder))
-    # the many small programs take seconds in total
+    # also keep small programs: there are many, and together they take seconds to
+    # compile
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     # an entry that cannot be read or written is compiled again, and nothing is lost

@@ -4,7 +4,8 @@ import math
 from pathlib import Path
 
 
-# maximum number of values kept by a sweep: 8 bytes each must fit into a laptop's memory
+# maximum number of values kept by a sweep; at 8 bytes each, they fit into the memory of
+# a laptop
 _MOST = 2 * 10**8
 
 
@@ -13,8 +14,8 @@ def numbers(
 ) -> tuple[float, ...]:
     """Parse numbers separated by commas. **Raises:** `ValueError`.
 
-    **Arguments:** `finite`: reject non-finite numbers; a system rejects them too, with
-    its own message.
+    **Arguments:** `finite`: whether to reject non-finite numbers; not needed if the
+    system rejects them with its own message.
     """
     try:
         found = tuple(float(part) for part in text.split(","))

@@ -31,7 +31,7 @@ SOLVERS = {
 }
 ENGINES = ("loop", "diffeqsolve")
 CAM = "cam-follower"
-# longer lists are shortened
+# number of names above which an error message shows only a few of them
 _LISTED = 20
 
 

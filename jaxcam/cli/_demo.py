@@ -49,7 +49,7 @@ def demo(
     ] = True,
 ) -> None:
     """
-    Compare recordings with a model, diagnose the model and follow two orbit branches.
+    Compare recordings with a model, diagnose it and follow branches of periodic orbits.
 
     By default, the simulated recordings shipped with the package are used. The report
     with its figures is DIR/index.html, the data are in DIR/result.json, and the

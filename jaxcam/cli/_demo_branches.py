@@ -4,10 +4,11 @@ import dataclasses
 from pathlib import Path
 
 
-# Near the orbit with one impact per cycle at 145 rpm: angle (rad), velocity (rad/s)
+# A state near the orbit with one impact per cycle at 145 rpm: angle (rad), velocity
+# (rad/s)
 _NEAR = (0.4245, 1.828)
 _AT_RPM = 145.0
-# Bounds (rpm) of P(1,1) and of P(inf,1)
+# Speed bounds (rpm) of the branches P(1,1) and P(inf,1)
 _BOUNDS = ((130.0, 154.0), (115.0, 160.0))
 
 
@@ -30,7 +31,7 @@ _CAPTION = (
 
 
 def _interrupted(point) -> bool:
-    """Find the interruption of chatter of the sticking orbit."""
+    """Return whether a point is the interruption of chatter of the sticking orbit."""
     return point.kind == "interruption of chatter"
 
 

@@ -1,4 +1,4 @@
-"""Compute the result of `jaxcam demo`, and write it as page, data and text."""
+"""Compute the result of `jaxcam demo`, and write it as a page, data and text."""
 
 import dataclasses
 from collections.abc import Sequence

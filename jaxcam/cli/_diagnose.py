@@ -31,7 +31,9 @@ def diagnose(
     json_file: Annotated[
         Path | None,
         typer.Option(
-            "--json", metavar="FILE", help=("Write the verdict to FILE; - prints it.")
+            "--json",
+            metavar="FILE",
+            help="Write the verdict to FILE, or to standard output if FILE is '-'.",
         ),
     ] = None,
     out: Annotated[
@@ -114,8 +116,8 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
 
 
 def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
-    """Predict bifurcation speeds with and without the found terms, and the next
-    recording.
+    """Predict bifurcation speeds with and without the identified terms, and recommend
+    the next recording.
     """
     from .. import discrepancy
     from ._outlook import Outlook

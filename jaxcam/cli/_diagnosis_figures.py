@@ -25,7 +25,7 @@ _BINS = 36
 
 
 def unit_along(variable: str, motion: str) -> str:
-    """Return the unit of a shape's argument, for a motion in this unit."""
+    """Return the unit of a shape's argument, if the motion has the unit `motion`."""
     of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
     if variable in of_drive:
         return of_drive[Variable(variable)]
@@ -110,7 +110,7 @@ def _unseen(plt, found: Diagnosis):
 
 
 def _improvement(pair: tuple[Residuals, Residuals]) -> float:
-    """Return the ratio of the mean squares of a recording before and after."""
+    """Return the ratio of the mean squared residuals before and after the diagnosis."""
     before, after = (float(np.mean(part.value**2)) for part in pair)
     return before / max(after, 1e-300)
 
@@ -155,7 +155,7 @@ def _maps(plt, found: Diagnosis):
 
 
 def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
-    """Return flight, and contact if the recording has any."""
+    """Return the values of `resting` to draw: flight, and contact if there is any."""
     return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
@@ -197,7 +197,9 @@ def _missing(plt, found: Diagnosis):
 
 
 def _unit_of(one: MissingFunction, argument: str, motion: str) -> str:
-    """Return the unit of an argument of a missing term, for a motion in this unit."""
+    """Return the unit of an argument of a missing term, if the motion has the unit
+    `motion`.
+    """
     if argument == "frequency":
         return "Hz"
     if argument == "memory":
@@ -256,8 +258,7 @@ def _ranking(plt, found: Diagnosis):
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(-0.6, len(names) - 0.4)
     axis.set_xscale("log")
-    # the axis starts at the same value in every report, so that single bars are
-    # comparable
+    # the axis starts at the same value in every report, so that reports can be compared
     axis.set_xlim(0.05, max(1e2, 4 * max(delta for _, delta in pairs)))
     axis.invert_yaxis()
     axis.set_xlabel("BIC minus that of the verdict (–)")

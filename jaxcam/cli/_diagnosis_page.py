@@ -88,7 +88,7 @@ def _effects(found: Diagnosis) -> list[str]:
 
 
 def _before_and_after(found: Diagnosis) -> list[str]:
-    # the unit of the figures
+    # the same unit as in the figures
     factor, unit = scaled(found.unit, REACH * found.noise_floor)
     parts = [
         "<h2>Error on held-out flights</h2>",

@@ -82,7 +82,7 @@ class Sweep:
 
     @property
     def seconds(self) -> tuple[float, ...] | None:
-        """Return the seconds to wait and to record."""
+        """Return the settling and recording times (s), or None without `--dwell`."""
         if self.dwell is None:
             return None
         found = numbers("--dwell", self.dwell, "60,10")
@@ -150,7 +150,7 @@ class Starts:
 
     @property
     def given(self) -> tuple[float, ...] | None:
-        """Return the single initial state."""
+        """Return the initial state given by `--state`, or None."""
         return None if self.state is None else numbers("--state", self.state, "0.4,1.8")
 
     @property

@@ -66,7 +66,7 @@ def fail(message: str) -> None:
 
 
 def _shortened(word: str) -> str:
-    """Shorten a message that contains an excessively long path."""
+    """Shorten a word of a message that is excessively long, such as a path."""
     return word if len(word) <= 300 else f"{word[:40]}...{word[-20:]}"
 
 

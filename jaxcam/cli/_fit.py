@@ -30,7 +30,7 @@ def fit(
             metavar="FILE",
             help=(
                 "Write the fitted system and its standard errors to FILE, for use with "
-                "--system; - prints them."
+                "--system, or to standard output if FILE is '-'."
             ),
         ),
     ] = None,

@@ -54,7 +54,7 @@ class Result:
         )
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the fitted system with its errors, for `--system` of other
+        """Return the fitted system with its errors, for use with `--system` in other
         commands.
         """
         fit: dict[str, Any] = self.after.to_json()
@@ -73,7 +73,7 @@ class Result:
         drive, model = self.segments[0].drive, self.after.model(0)
         for one in self.problem.parameters:
             if one.known is not None:
-                # a condition that holds for the first recording only
+                # the fitted value of a condition holds only for the first recording
                 usual = one.where(self.problem.model)
                 model = eqx.tree_at(one.where, model, usual)
         system = model.system

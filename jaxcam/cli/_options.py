@@ -56,13 +56,13 @@ Speed: TypeAlias = Annotated[
 Lowest: TypeAlias = Annotated[
     float | None,
     typer.Option(
-        "--from", metavar="A", help="Lower bound of the parameter (rpm for speed)."
+        "--from", metavar="A", help="Lower bound (rpm for the speed of the cam)."
     ),
 ]
 Highest: TypeAlias = Annotated[
     float | None,
     typer.Option(
-        "--to", metavar="B", help="Upper bound of the parameter (rpm for speed)."
+        "--to", metavar="B", help="Upper bound (rpm for the speed of the cam)."
     ),
 ]
 Workers: TypeAlias = Annotated[
@@ -83,7 +83,9 @@ Cluster: TypeAlias = Annotated[
 JsonFile: TypeAlias = Annotated[
     Path | None,
     typer.Option(
-        "--json", metavar="FILE", help=("Write the result to FILE; - prints it.")
+        "--json",
+        metavar="FILE",
+        help="Write the result to FILE, or to standard output if FILE is '-'.",
     ),
 ]
 Resume: TypeAlias = Annotated[

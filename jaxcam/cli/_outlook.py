@@ -12,7 +12,7 @@ from ..discrepancy.terms import Value
 
 
 class Rows(NamedTuple):
-    """One table with the meaning of its columns."""
+    """A table, with a note that explains its columns."""
 
     title: str
     headings: tuple[str, ...]
@@ -22,13 +22,13 @@ class Rows(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Outlook:
-    """Bifurcation speeds, and proposed experiments with the best first."""
+    """Predicted bifurcation speeds, and proposed experiments, the best first."""
 
     speeds: tuple[Prediction, ...] = ()
     experiments: tuple[Experiment, ...] = ()
 
     def tables(self) -> Iterator[Rows]:
-        """The tables that are not empty; speeds in rpm."""
+        """Return the tables that are not empty; speeds are in rpm."""
         if self.speeds:
             yield Rows(
                 "Cam speeds at which the motion changes",
@@ -56,7 +56,7 @@ class Outlook:
         return self.experiments[:_SHOWN]
 
     def data(self) -> dict[str, Any]:
-        """Return the data for verdict.json without empty parts; speeds in rad/s."""
+        """Return the data for verdict.json without empty parts; speeds are in rad/s."""
         found: dict[str, Any] = {}
         if self.speeds:
             found["predictions"] = [dataclasses.asdict(one) for one in self.speeds]
@@ -68,7 +68,7 @@ class Outlook:
         return found
 
 
-# Experiments in a table
+# Maximum number of experiments in a table
 _SHOWN = 5
 
 

@@ -14,7 +14,7 @@ from ._rests import HEADINGS, rest_rows, Rests
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """The content of the page in order; figures have captions."""
+    """The content of the page, in the order in which it appears."""
 
     title: str
     sentence: str
@@ -73,7 +73,7 @@ def _lacks(summary: str | None) -> list[str]:
 
 
 def _branches(found: Branches | None) -> list[str]:
-    """Return the section on two branches of orbits and their bifurcations."""
+    """Return the section on two branches of periodic orbits and their bifurcations."""
     if found is None:
         return []
     return [
@@ -130,7 +130,7 @@ _MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most significant a
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    # the unit of the figures
+    # the same unit as in the figures
     factor, unit = scaled(row.unit, 4 * max(row.rms, row.noise))
     sizes = (f"{factor * one:.2g}" for one in (row.rms, row.noise))
     numbers = (f"{row.ratio:.2f}", *sizes)

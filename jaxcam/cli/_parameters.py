@@ -15,7 +15,7 @@ from ..models import CamFollower, ConstantRestitution
 from ._source import make_system, Source
 
 
-# the cam speed is in rad/s, but rpm on the command line, with its own option
+# the cam speed is in rad/s; on the command line, it is in rpm and has its own option
 _SPEED = "speed"
 _CONSTANT = "restitution.r"
 
@@ -106,7 +106,7 @@ def _leaves(system) -> dict[str, jax.Array]:
     kept = eqx.filter(system, eqx.is_inexact_array)
     found, _ = jax.tree_util.tree_flatten_with_path(kept)
     names = (jax.tree_util.keystr(path).lstrip(".") for path, _ in found)
-    # a system with added terms keeps the names of its drive
+    # for a system with added terms, the speed keeps its short name
     names = [_SPEED if name == f"base.{_SPEED}" else name for name in names]
     return dict(zip(names, (leaf for _, leaf in found)))
 

@@ -18,7 +18,7 @@ COMPILING = "compiling (the first run of a system takes longest)"
 """First message of commands that compile before they compute."""
 
 
-# least time (s) between lines
+# minimum time (s) between lines
 _INTERVAL = 30.0
 
 

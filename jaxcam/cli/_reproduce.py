@@ -11,7 +11,7 @@ from ._options import JsonFile, Resume
 
 
 _PRESETS = ("calibrated", "table-4.4")
-"""Preset of the rig; the first is the default."""
+"""Presets of the rig; the first is the default."""
 _SIZES = ("default", "full")
 _ALL = "all"
 
@@ -53,7 +53,7 @@ def reproduce(
     """
     Reproduce tables and figures of a PhD thesis (Alzate, 2008).
 
-    The tables show printed and computed values.
+    The tables compare the values printed in the thesis with computed values.
 
     \b
     Examples:

@@ -15,19 +15,20 @@ from ._output import to_text
 from ._source_mark import source_mark
 
 
-# exceptions for a file that is not a record, including deeply nested brackets
+# exceptions raised on reading a file that is not a record, such as one with too deeply
+# nested brackets
 _BROKEN = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
 
 
 @dataclasses.dataclass(frozen=True)
 class Origin:
-    """Everything that determines a result apart from its target."""
+    """Everything that determines a result, except its target."""
 
     version: str
     preset: str
     size: str
     code: str
-    """Mark of the code that computed it; see `source_mark`."""
+    """Mark of the code that computed the result; see `source_mark`."""
 
     @staticmethod
     def of(preset: str, size: str) -> "Origin":

@@ -33,7 +33,7 @@ def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
 
 
 class Along:
-    """The axis of a residual plot: the drive angle, or time without a drive."""
+    """The axis of a residual plot: drive angle, or time if there is no drive."""
 
     def __init__(self, parts: Sequence[Residuals]):
         self.turns = all(np.any(np.isfinite(part.turned)) for part in parts)
@@ -52,7 +52,7 @@ class Along:
         return "drive angle" if self.turns else "time"
 
     def place(self, part: Residuals) -> Float[np.ndarray, " k"]:
-        """Return the position of each residual between `start` and `end`."""
+        """Return the positions of the residuals on the axis (from `start` to `end`)."""
         if not self.turns:
             return part.time
         return np.nan_to_num(part.turned) % (2 * math.pi)

@@ -61,9 +61,9 @@ class Rests:
 
 
 def simulate_run(rig: Rig, run: Segments) -> Trajectory:
-    """Simulate the nominal model at the mean speed of a recording, until its end.
+    """Simulate the nominal model at the mean speed of a recording, up to its end.
 
-    It starts at a release point, twenty cam turns before the recording.
+    The simulation starts at a release point, twenty cam turns before the recording.
     """
     assert run.drive is not None
     system = rig.system(run.drive.speed, run.drive.phase)
@@ -152,5 +152,5 @@ def _typical(angle: Float[np.ndarray, " k"]) -> str:
     turned = np.mod(angle - np.angle(mean) + math.pi, 2 * math.pi) - math.pi
     middle = (np.angle(mean) + np.mean(turned)) % (2 * math.pi)
     spread = f"{np.std(turned):.2f}"
-    # a periodic motion has none
+    # a periodic motion has no spread
     return f"{middle:.2f}" if float(spread) == 0 else f"{middle:.2f} ± {spread}"

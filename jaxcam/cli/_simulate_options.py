@@ -17,9 +17,9 @@ class RunOptions:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Initial state, such as 0.3,0, or release for the release point of a "
-            "sticking orbit. Default: release; 1,0 for the bouncing ball; 0,0.1,-2 for "
-            "the triple integrator.",
+            help="Initial state, such as 0.3,0, or the word 'release' for the release "
+            "point of a sticking orbit. Default: release; 1,0 for the bouncing ball; "
+            "0,0.1,-2 for the triple integrator.",
         ),
     ] = None
     t0: Annotated[float, typer.Option(metavar="S", help="Initial time (s).")] = 0.0
@@ -65,7 +65,7 @@ class RunOptions:
 
     @property
     def chosen_engine(self) -> str:
-        """Return the engine, or the engine that the solver needs."""
+        """Return the chosen engine; by default, the one that the solver needs."""
         implicit = self.solver.startswith("kvaerno")
         return self.engine or ("diffeqsolve" if implicit else "loop")
 
@@ -98,6 +98,6 @@ class RunOptions:
             raise ValueError(f"{name} has no forcing period; give --t1.")
         if not turns > 0:
             raise ValueError(f"--turns is {turns:g}; give a positive number.")
-        # a speed of zero would give an infinite period, which the system reports
+        # reject a speed of zero, for which the period would be infinite
         model.check()
         return self.t0 + turns * float(model.period)

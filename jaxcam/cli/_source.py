@@ -1,4 +1,4 @@
-"""The system that a command uses: built in, saved, or in a user's file."""
+"""The system that a command uses: built-in, saved, or defined in a user's file."""
 
 import dataclasses
 import math

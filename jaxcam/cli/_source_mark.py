@@ -1,4 +1,4 @@
-"""A hash of the source code, to recognise results of other versions."""
+"""A hash of the source code, which reveals results computed by other versions."""
 
 import functools
 import hashlib

@@ -59,7 +59,7 @@ class Execution:
 
             from ..sweeps import cluster
 
-            # new processes find the compiled programs
+            # so that new processes find the compiled programs
             folder = jax.config.jax_compilation_cache_dir  # pyright: ignore
             if folder:
                 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))

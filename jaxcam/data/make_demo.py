@@ -4,8 +4,8 @@
 
 The rig is simulated here with a scalar Runge-Kutta loop that is independent of
 `jaxcam.hybrid`, so that the comparison is meaningful. The rig has viscous friction in
-the hinge, which the textbook model lacks, a drive whose speed wanders, and encoders
-with noise.
+its hinge, which the textbook model lacks; the speed of its drive drifts, and its
+encoders are noisy.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 
-# A gap that opens from zero is not closed again by rounding errors above this (rad)
+# Penetration (rad) up to which a gap that has just opened does not count as closed
 _ROUNDING = 1e-13
 
 
@@ -43,8 +43,8 @@ class RealRig:
     wander: float = 2e-4
 
     def acceleration(self, angle: float, velocity: float) -> float:
-        """Return the acceleration (rad/s^2) of the free follower: spring (thesis, eq.
-        4.9) and viscous hinge.
+        """Return the acceleration (rad/s^2) of the free follower due to the spring
+        (thesis, eq. 4.9) and the viscous hinge.
         """
         sine, secant = math.sin(angle), 1 / math.cos(angle)
         stretch = (self.spring_hook_x * sine + self.half_height) * secant
@@ -115,7 +115,8 @@ class _Follower:
         self.t, (self.x, self.v, _) = 0.0, cam.surface(0.0)
         self.x += 0.01
         self.resting, self.landed = False, 0.0
-        # fraction of a step; the next flight must not end within its own first one
+        # longest next step, shorter just after an impact: a flight must not end within
+        # its first step
         self.longest = interval
         self.impacts: list[tuple[float, float]] = []
         self.contacts: list[tuple[float, float]] = []
@@ -173,8 +174,8 @@ class _Follower:
         self.x, self.v, _ = self.cam.surface(self.t)
 
     def _hit(self, h: float) -> None:
-        """Apply an impact after a flight of duration h, or begin contact if flights are
-        short.
+        """Apply an impact after a flight of duration h, or begin contact if the
+        remaining flights are very short.
         """
         r = self.rig.restitution
         _, before = self._fly(h)
@@ -185,7 +186,7 @@ class _Follower:
         self.impacts.append((self.t, approach))
         pull = acceleration - self.rig.acceleration(self.x, self.v)
         flight = 2 * r * approach / pull if pull > 0 else self.interval
-        # total duration of the remaining flights
+        # the total duration of the remaining flights is flight / (1 - r)
         if 0 < flight < 1e-6 * (1 - r):
             self.resting, self.landed = True, self.t
             self.v, self.longest = rate, self.interval
@@ -194,8 +195,8 @@ class _Follower:
 
 
 def _bisect(h: float, crossed: Callable[[float], bool]) -> float:
-    """Return the time in (0, h] from which a condition holds, given that it holds
-    at h.
+    """Return the earliest time in (0, h] from which a condition holds, given that it
+    holds at h.
     """
     low, high = 0.0, h
     for _ in range(45):

@@ -1,4 +1,4 @@
-"""Seek missing physics at other coordinates and gaps than the first."""
+"""Seek missing physics at coordinates and gaps other than the first."""
 
 import dataclasses
 from collections.abc import Callable
@@ -18,7 +18,7 @@ def falls_short(found: Diagnosis) -> bool:
 
 
 def _left(found: Diagnosis) -> float:
-    """Return the cost above that of the noise."""
+    """Return the part of the cost that exceeds the cost of noise alone."""
     return max(found.after.cost - found.after.problem.samples, 0.0)
 
 
@@ -28,7 +28,7 @@ def sought_elsewhere(
     """Return the diagnosis at the location where the missing physics explains most.
 
     **Arguments:** the diagnosis at the first coordinate and gap, which falls short; a
-    function that diagnoses at another location; and whether the terms are those of the
+    function that diagnoses at a given location; and whether the terms are those of the
     library, which act at any gap.
     """
     problem = found.after.problem

@@ -70,7 +70,7 @@ def event_causes(
         where: Selects the parameter of the rig that is fitted together with each term,
             such as `lambda rig: rig.restitution.intercept`.
         tolerance: Tolerance of this parameter.
-        policy: Settings that limit the search of strengths.
+        policy: Settings that limit the range of strengths searched.
         progress: Called with the fraction of terms completed.
 
     Returns:

@@ -76,7 +76,7 @@ class EventSpeeds:
 
 
 def event_speeds(system: WithTerms, policy: Policy = Policy()) -> EventSpeeds:
-    """Find the four speeds of a rig; its present speed has no effect.
+    """Find the four speeds of a rig; the drive speed set in it has no effect.
 
     The base is a [`jaxcam.models.CamFollower`][]; terms may depend on time only through
     the phase of the cam. The policy gives the range in which orbits are searched for.
@@ -107,7 +107,7 @@ def _at(system, speed):
 
 
 def _float_of(system: WithTerms) -> SpecialPoint | None:
-    """Return the valve-float speed; the search starts from that of the base."""
+    """Return the valve-float speed, searched for from that of the base."""
     base = float_speed(system.base)  # pyright: ignore
     if not (np.isfinite(base.speed) and base.speed > 0):
         return None
@@ -125,8 +125,9 @@ def _towards(
 ) -> SpecialPoint | None:
     """Find the fold (+1) or the flip (-1) of the branch through an orbit.
 
-    The sum of the multipliers is monotonic along the branch, also around the fold,
-    where the speed is not; at the two points it is +-(1 + their product).
+    The sum of the multipliers is monotonic along the branch, even around the fold,
+    where the speed is not. At the fold and the flip, this sum is +-(1 + the product of
+    the multipliers).
     """
     moved = _at(system, start.parameter)
     matrix = np.asarray(_monodromy(moved, start.orbit))

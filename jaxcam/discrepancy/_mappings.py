@@ -14,8 +14,8 @@ def make_room(used: Path = _USED, limit: Path = _LIMIT) -> bool:
     """Drop compiled programs if another diagnosis might exceed the limit.
 
     Each program uses some of the memory mappings that Linux allows per process; beyond
-    the limit, the compiler fails with "Cannot allocate memory". On other systems this
-    does nothing.
+    the limit, the compiler fails with "Cannot allocate memory". On other operating
+    systems, this function does nothing.
 
     **Returns:** whether programs were dropped.
     """

@@ -129,8 +129,8 @@ def _refuse_hidden(found: Diagnosis) -> None:
 
 
 def _of_others(parameter: Parameter, records: int) -> Parameter:
-    """Return a parameter whose value is known for each recording, with the value of the
-    first recording for new ones.
+    """Return a parameter for new recordings; a constant known for each recording keeps
+    its value from the first one.
     """
     if parameter.known is None:
         return parameter
@@ -256,8 +256,8 @@ def _terms(found: Diagnosis) -> tuple[Term, ...]:
 
 
 class _Question(NamedTuple):
-    """Target quantities: `slopes` `(k, p)` of k values with respect to the parameters
-    `own`, a subset of `free`.
+    """Target quantities: k values with the derivatives `slopes` `(k, p)` with respect
+    to the p parameters `own`, which are among the `free` parameters.
     """
 
     free: list[str]
@@ -303,8 +303,8 @@ def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
 
 
 def _stderr(known: Blocks, more, question: _Question) -> float:
-    """Return the rms standard error of the target quantities when some parameters are
-    free.
+    """Return the rms standard error of the target quantities when the parameters
+    `question.free` are free.
     """
     information, score = known.total()
     if more is not None:

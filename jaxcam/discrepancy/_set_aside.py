@@ -1,7 +1,7 @@
 """Find and exclude a recording that is inconsistent with the others.
 
-A misread recording (wrong gain, rig or unit) cannot be explained by physics that it
-shares with the others, and it would hide the physics missing in all of them.
+Physics shared by all recordings cannot explain a misread one (wrong gain, rig or
+unit), and a misread recording would hide the physics missing in all of them.
 """
 
 import dataclasses
@@ -17,8 +17,8 @@ def odd_record(found: Diagnosis) -> str | None:
     others.
 
     There must be at least `policy.records_apart` recordings. The cost per sample of the
-    odd one exceeds `policy.near`, and that of every other one by a factor of
-    `policy.odd`.
+    inconsistent one must be at least `policy.near`, and at least `policy.odd` times
+    that of every other recording.
     """
     policy, costs = found.policy, cost_by_record(found.after)
     if len(costs) < policy.records_apart:

@@ -1,9 +1,8 @@
 """All settings of a diagnosis.
 
-The first group determines the verdict; quantities that follow from the data or from
-another setting (the BIC, the error rate per term and the detection limit) are derived.
-The second group limits the search: it affects the computing time and should not affect
-the verdict. The third group determines the content of a report.
+The first group determines the verdict, the second limits the search and should affect
+only the computing time, and the third determines the content of a report. The BIC, the
+error rate per term and the detection limit are derived from the data and the settings.
 """
 
 import dataclasses
@@ -44,14 +43,12 @@ class Setting(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Policy:
-    """Settings that determine the verdict, limit the search and select the content of
-    the report.
+    """Settings that affect the verdict, the search or the report of a diagnosis.
 
     To change a setting, pass `diagnose(..., policy=Policy(false_alarms=0.05))`. Numbers
     without a unit are ratios or counts. A cost is minus twice the log-likelihood; a
-    cost per sample of one means that the residuals are pure noise.
-    [Discrepancy](../discrepancy.md) lists all fields in a table, and `settings` yields
-    each with its meaning.
+    cost per sample of one means pure noise. [Discrepancy](../discrepancy.md) lists all
+    fields in a table, and `settings` yields each with its meaning.
 
     Raises:
         ValueError: A number is out of range.
@@ -79,21 +76,25 @@ class Policy:
         "maximum relative error of the functional form of a named term; its square is "
         "the fraction of the explained cost that may remain",
     )
-    form_loss: float = _decides(10.0, "loss in BIC up to which a formula is kept")
+    form_loss: float = _decides(10.0, "largest loss in BIC of a formula that is kept")
     elsewhere: float = _decides(
         0.5,
         "another location is chosen if it leaves less than this fraction of a residual",
     )
     corner_share: float = _decides(
         3e-4,
-        "maximum fraction of the explained cost due to the smoothing of dry friction; "
-        "a term that explains less is not named together with a friction term",
+        "maximum fraction of the explained cost that the smoothing of dry friction may "
+        "cause; a term that explains less is not named together with a friction term",
     )
     differs: float = _decides(
-        0.5, "minimum fraction of the misfit that separate values must explain"
+        0.5,
+        "minimum fraction of the misfit that separate parameter values for each "
+        "recording must explain",
     )
     as_much: float = _decides(
-        0.9, "minimum gain of a common function, relative to that of separate values"
+        0.9,
+        "minimum gain of a function common to all recordings, relative to that of "
+        "separate parameter values",
     )
     near: float = _decides(
         4.0, "cost per sample below which a fit counts as near the data"
@@ -177,10 +178,11 @@ class Policy:
         50.0, "difference in BIC up to which a subset or a form is followed further"
     )
     helped: float = _bounds(
-        0.7, "ratio of the costs with and without a term below which the search goes on"
+        0.7, "the search goes on if a term reduces the cost to less than this fraction"
     )
     clear: float = _bounds(
-        10.0, "multiple of the required gain above which a loss of fit is not refined"
+        10.0,
+        "multiple of the required gain above which a loss of fit need not be accurate",
     )
     astray: float = _bounds(
         3.0,
@@ -213,7 +215,7 @@ class Policy:
     function_lengths: tuple[float, ...] = _bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
         "correlation lengths of a free function, as fractions of the range of its "
-        "argument, or in radians of a phase",
+        "argument or, for a phase, in radians",
     )
     function_sizes: tuple[float, ...] = _bounds(
         (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6),
@@ -231,7 +233,7 @@ class Policy:
         0.1, "fraction of the tolerated residual below which the search ends"
     )
     heats: int = _bounds(
-        4, "maximum number of fits of a free function until its prior converges"
+        4, "maximum number of fits of a free function in which its prior must converge"
     )
     recentred: int = _bounds(
         12, "maximum number of additional fits for the parameters of an element"
@@ -240,7 +242,7 @@ class Policy:
         1.5, "ratio of consecutive costs below which the prior has converged"
     )
     bootstrap: int = _bounds(
-        200, "number of bootstrap samples, of blocks and of drive signals"
+        200, "number of bootstrap samples, both of blocks and of drive signals"
     )
     frequency_grid: int = _bounds(
         4, "number of frequencies per resolution cell of a scan"
@@ -268,7 +270,7 @@ class Policy:
         (1.1, 1.4),
         "multiples of the detachment speed that bracket the interruption of chatter",
     )
-    drawn_rigs: int = _bounds(12, "number of random rigs for the errors of predictions")
+    drawn_rigs: int = _bounds(12, "number of rigs drawn to estimate prediction errors")
     next_speeds: int = _bounds(7, "number of speeds compared for the next recording")
     next_beyond: float = _bounds(
         0.05, "relative extension of the recorded speed range at either end"
@@ -297,20 +299,20 @@ class Policy:
         3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
     rival: float = _shows(
-        30.0, "difference in BIC up to which the next recording tests another term"
+        30.0, "difference in BIC up to which the next recording separates alternatives"
     )
     absent_errors: float = _shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"
     )
     cost_errors: float = _bounds(
-        3.0, "excess cost, in standard deviations, above which it is not due to noise"
+        3.0, "largest excess cost, in standard deviations, that is attributed to noise"
     )
     nearby: float = _shows(
         0.03,
         "distance, as a fraction of the range, within which data count as near a point",
     )
     visited: float = _shows(
-        0.1, "minimum data density, relative to uniform, at which a function is shown"
+        0.1, "minimum data density, relative to a uniform density, to show a function"
     )
     shape_points: int = _shows(48, "number of points at which a free function is shown")
     several: int = _shows(6, "maximum number of recordings whose values are listed")
@@ -334,16 +336,15 @@ class Policy:
 
     @property
     def beyond(self) -> float:
-        """Standard errors above the threshold at which detection has the probability
-        `sure`.
+        """Number of standard errors by which an effect must exceed the threshold to be
+        detected with probability `sure`.
         """
         return float(norm.ppf(self.sure))
 
     @property
     def small(self) -> float:
-        """Share of the explained cost that may remain, `form_error**2`.
-
-        The likelihood is quadratic in the error of a force.
+        """Fraction of the explained cost that may remain: `form_error**2`, because the
+        log-likelihood is quadratic in the error of a force.
         """
         return self.form_error**2
 

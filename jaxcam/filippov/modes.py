@@ -21,7 +21,7 @@ def surface_rates(
         state: State, shape `(n,)`.
 
     Returns:
-        Two scalars, above and below.
+        Two scalars: the rates along the fields `above` and `below`.
     """
     t = jnp.asarray(t, dtype=float)
 
@@ -33,8 +33,8 @@ def surface_rates(
 
 
 def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
-    """Return the weight of the upper field in sliding; it is between 0 and 1 if the
-    system slides.
+    """Return the weight of the field `above` in the sliding field; it is between 0 and
+    1 if the system slides.
     """
     above, below = surface_rates(system, t, state)
     difference = below - above

@@ -79,9 +79,9 @@ def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parame
     """Return the identifiable parameters of the rig: stiffness K (as K/J), spring, cam
     and restitution.
 
-    The inertia is held fixed because only K/J affects the motion. The follower's half
-    height in the profile is also fixed, because only its sum with the cam radius
-    matters.
+    The inertia is held fixed because only K/J affects the motion. The half height of
+    the follower in the cam profile is also fixed, because only its sum with the cam
+    radius matters.
 
     Args:
         rig: The rig.

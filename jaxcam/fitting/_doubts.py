@@ -20,7 +20,8 @@ from .engine import (
 # Cost per sample, or per component of a joint, that noise does not explain: with noise
 # alone it is 1 on average, and within a few per cent of 1 for thousands of samples
 _PIECE, _JOINT, _MEAN = 4.0, 9.0, 4.0
-# Fraction of the pieces that must be below it: one bad recording of many is an outlier
+# Fraction of the pieces that must be below the limit, so that one bad recording of many
+# does not matter
 _USUAL = 0.75
 # Tolerance for reaching a bound, relative to the parameter's scale
 _ON_BOUND = 1e-9

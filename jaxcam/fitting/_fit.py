@@ -33,18 +33,18 @@ PROMISE = 1e-3
 """
 # limit of the predicted gain of an undamped step: less than a tenth of a standard error
 _GRADIENT = 1e-2
-# Steps that may follow before the first one is accepted or rejected
+# Maximum number of corrections before a step is accepted or rejected
 _CORRECTIONS = 3
-# Share of the excess cost to which each of them must reduce it
+# Each correction must reduce the excess cost to less than this fraction
 _LEADS_BACK = 0.5
-# A flight with more pieces than this is initially not predicted from its start
+# A flight with more pieces than this is first fitted with loose joints
 _LONG = 16
-# Factors on parameters without a tolerance, for restarts after a fit ended far off
+# Factors on parameters without a tolerance, for restarts of a fit that ended far off
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
-# in units of the parameters' scales, over which a model may be nonlinear
+# Damping relative to the scales of the parameters
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
-# Factors on the damping after a good step and a poor one; and after a good step, if
-# less damping has recently failed
+# Factors on the damping: after a good step; and after a poor step, or a good step that
+# follows a rejected one
 _EASED, _POOR = 0.1, 0.5
 
 
@@ -144,10 +144,11 @@ def _far(problem, found: _Descent, weights) -> bool:
 
 
 def _other_starts(problem, columns, extras, point, prior, loosely):
-    """Return starts for a fit that ended far from the data, the lowest cost first.
+    """Yield other starting points for a fit that ended far from the data.
 
-    They use loose joints, and parameters that differ by a few of their scales: the cost
-    of an oscillation over many periods has many local minima.
+    Each is the result of a fit with loose joints, first from the given point, then with
+    parameters multiplied by a few factors: the cost of an oscillation over many periods
+    has many local minima.
     """
     yield loosely()
     loose = loosened(extras)
@@ -185,15 +186,16 @@ def _descend(
     cost = total(costs, point)
     damping, message, optimal, count = _FIRST_DAMPING, "", False, 0
     so_far = [cost]
-    # what the next good step does to the damping; steps rejected since the last one
+    # factor on the damping after the next good step; number of steps rejected since the
+    # last accepted one
     eased, raised = _EASED, 0
     while count < iterations:
         count += 1
         step, promise = damped_step(problem, columns, blocks, point, damping, prior)
         fine = np.isfinite(promise)
         if fine and promise < PROMISE:
-            # a damped step predicts little gain along a valley; the undamped step must
-            # as well
+            # in a valley, a damped step always predicts little gain; the undamped step
+            # must predict little gain as well
             _, whole = damped_step(
                 problem, columns, blocks, point, _LEAST_DAMPING, prior
             )
@@ -208,8 +210,8 @@ def _descend(
             value = total(changed, step)
         excess = np.inf
         for _ in range(_CORRECTIONS):
-            # the valley is curved and steep: a long step along it ends on its side, so
-            # it is assessed after the next steps, while these lead back quickly
+            # in a curved, steep valley, a long step ends on the slope: it is assessed
+            # after corrections, as long as these lead back into the valley quickly
             if value <= cost or not value - cost < _LEADS_BACK * excess:
                 break
             excess = value - cost

@@ -143,9 +143,9 @@ def free_run(
 class Prepared(eqx.Module):
     """A recording prepared for a free run.
 
-    `state` `(n,)` at the first sample, estimated from `samples` of them; times `start`
-    and `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their `noise`
-    `(c,)`; the number of `steps` between two samples.
+    `state` `(n,)` at the first sample, estimated from the first `samples`; times
+    `start` and `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their
+    `noise` `(c,)`; the number of `steps` between two samples.
     """
 
     state: Float[Array, " n"]
@@ -315,14 +315,14 @@ def restarted(model: Model, one: Prepared) -> Prepared:
 
 
 def _first(one: Prepared) -> Prepared:
-    """Return the samples used to fit the initial state."""
+    """Return the part of the recording to which the initial state is fitted."""
     return dataclasses.replace(
         one, level=one.level[: one.samples], data=one.data[: one.samples]
     )
 
 
 def _levels(model: Model, run: Recording) -> Float[Array, " k"]:
-    """Return the input at each sample; zero without one."""
+    """Return the input at each sample; zero if the model has no input."""
     spacing = np.diff(run.time)
     if np.ptp(spacing) > 2 * _UNEVEN * np.mean(spacing):
         raise RecordingError(

@@ -15,7 +15,7 @@ from .engine import assemble, free_columns, Problem, reduced
 # a combination is identifiable if the data reduce its error to this fraction of the
 # tolerance
 _SEEN = 0.5
-# Squared fraction of a parameter in a direction that may be due to rounding
+# A squared component of a direction that is below this may be due to rounding
 _ROUNDING = 1e-12
 # relative difference up to which two relative changes are equal
 _SAME = 0.05

@@ -25,7 +25,7 @@ _MAJORITY = 0.7
 _MAD = 1.4826
 # Smallest ratio of speeds that shows a dependence of restitution on speed
 _RANGE = 1.5
-# Share of the squared scatter
+# Residuals of a constant law below this share of the squared scatter count as zero
 _NOTHING = 1e-4
 
 
@@ -198,7 +198,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     weights = _weights(table)
     every = np.ones(len(table), dtype=bool)
     kept = {name: _sound(table, one) for name, one in weights.items()}
-    # the same rows for both laws, so that they can be compared
+    # the same rows for each kind of scatter, so that the likelihoods are comparable
     some = np.any(list(kept.values()), axis=0)
     kind = max(weights, key=lambda name: _likelihood(table, weights[name], some))
     keep = kept[kind]
@@ -208,7 +208,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
 
 
 def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
-    """Return the relative scatter of the impacts, for each unit."""
+    """Return the relative scatter of the impacts, for each unit it may have."""
     if table.approach_stderr is None and table.separation_stderr is None:
         return {table.unit: np.ones(len(table)), "1": table.approach}
     r = float(np.median(table.separation / table.approach))
@@ -277,7 +277,7 @@ def _off(table: ImpactTable, r):
 def _chosen(table: ImpactTable, kind: str, weights, keep) -> ImpactLaw:
     count = int(np.sum(keep))
     scale = 1.0
-    # the scatter is that about the more general law
+    # the scatter is estimated about the more general law
     for _ in range(3):
         fits = _fits(table, weights * scale, keep)
         most = fits.get("power", fits["constant"])

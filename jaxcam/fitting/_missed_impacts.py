@@ -18,7 +18,8 @@ _COST, _UNUSUAL = 3.0, 3.0
 _QUARTILE = 0.75
 # An impact is accepted if it explains at least this part of the excess cost
 _EXPLAINED = 0.5
-# or this part, if another impact is this close (s), as a soft contact bends the motion
+# or this part, if another impact is this close (s), because a soft contact bends the
+# motion
 _COMPLETELY, _NEAR = 0.99, 0.01
 # Steps of a fit, which need not converge
 _STEPS = 12
@@ -93,7 +94,7 @@ def _misfits(model, parameters, segments) -> list[_Misfits] | None:
     try:
         problem = Problem.build(model, segments, parameters)
     except ValueError:
-        # whoever fits these recordings is told why
+        # a later fit of these recordings reports the reason
         return None
     problem = dataclasses.replace(problem, extras=separated(problem.extras))
     pieces = problem.pieces

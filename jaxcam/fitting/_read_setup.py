@@ -35,12 +35,12 @@ _TABLES = (
     "records",
     *LAYOUT_KEYS,
 )
-# keys of one entry
+# keys of one entry of `[parameters]`
 _NUMBER = ("value", "tolerance", "lower", "upper", "unit")
 
 
 class _Stated(NamedTuple):
-    """One entry of `[parameters]`; without a tolerance, it is held fixed."""
+    """One entry of `[parameters]`; a value without a tolerance is held fixed."""
 
     value: float | bool | str
     tolerance: float = 0.0

@@ -252,8 +252,8 @@ def first_bounce(
     simulation starts on the surface at that impact, with a separation speed such that
     the next flight rises as high above the cam as the recorded one; the coefficient is
     this speed divided by the recorded approach speed. Unlike a fit of whole
-    trajectories, this method uses one number per period, the largest of several noisy
-    ones.
+    trajectories, this method uses one number per period: the maximum of several noisy
+    samples.
 
     Args:
         system: The system.
@@ -295,7 +295,7 @@ def first_bounce(
 @program
 def _speed_for_height(system, angle, duration, height) -> Array:
     """Find the separation speed of a flight of this `height` by bisection."""
-    # the gap is an angle minus that of the cam; on the cam, both are equal
+    # the gap is the angle of the follower minus that of contact with the cam
     contact = angle - system.gap(jnp.asarray(0.0), jnp.stack([angle, 0.0 * angle]))
     start = jnp.stack([contact, jnp.zeros_like(contact)])
     zero = jnp.zeros_like(contact)
@@ -311,7 +311,7 @@ def _speed_for_height(system, angle, duration, height) -> Array:
             k4 = system.vector_field(t + h, x + h * k3)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             gap = system.gap(t + h, x)
-            # a flight ends when it is back on the cam
+            # a flight ends when the follower is back on the cam
             open_ = (highest >= 0) & (gap > 0)
             return (t + h, x, jnp.where(open_, jnp.maximum(highest, gap), highest)), gap
 

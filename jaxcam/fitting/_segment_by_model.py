@@ -45,7 +45,7 @@ def segment_by_model(
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts
-    with a lower threshold. If its flight follows a contact, the flight is then taken to
+    with a lower threshold; if its flight follows a contact, this flight is taken to
     begin at the last sample near the surface.
 
     Args:

@@ -52,8 +52,9 @@ def unconstrained(
 ) -> tuple[Unconstrained, ...]:
     """Find unconstrained combinations: right singular vectors of the Jacobian.
 
-    The eigenvectors of the information J^T J are those of J, and its eigenvalues are
-    the squares of the singular values, with every column of J at unit length.
+    The eigenvectors of the information J^T J are the right singular vectors of the
+    Jacobian J, and its eigenvalues are the squares of the singular values. The columns
+    of J are first scaled to unit length.
 
     **Arguments:** names and `information` of the parameters in units of their `scale`;
     `firmer` returns the same matrix with a stronger regularisation of the eliminated

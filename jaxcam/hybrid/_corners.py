@@ -15,7 +15,7 @@ from ._system import HybridSystem
 from .surface import OnSides
 
 
-# operations with a corner or a jump in their arguments, as a user calls them
+# JAX operations with a corner or a jump, and the names under which users call them
 _CORNERS = {
     "abs": "abs",
     "argmax": "argmax",
@@ -34,7 +34,7 @@ _CORNERS = {
     "sort": "sort",
     "while": "while_loop",
 }
-# compiled functions of `jax.numpy`: their lines are those of the call
+# compiled functions of `jax.numpy`: a corner in one is reported at the line of its call
 _NUMPY = {
     "_where": "where",
     "clip": "clip",
@@ -45,7 +45,7 @@ _NUMPY = {
     "round": "round",
     "trunc": "trunc",
 }
-# folders whose lines are not the user's
+# folders with code that is not the user's
 _LIBRARIES = tuple(f"/site-packages/{name}/" for name in ("jax", "jaxlib", "equinox"))
 
 
@@ -89,7 +89,7 @@ def corners(system: HybridSystem, state: VectorLike) -> list[Corner]:
 
     Args:
         system: The system.
-        state: Any state, shape `(n,)`, for its number of components.
+        state: Any state, shape `(n,)`; only its number of components matters.
 
     Returns:
         A list of `Corner`, each of which prints as a sentence; empty for smooth
@@ -128,8 +128,6 @@ def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
 
     **Arguments:** the program; which of its arguments depend on time or state; and, for
     operations inside a function of `jax.numpy`, the name and place of its call.
-
-    Returns which of the results depend on time or state.
     """
     depends = {id(v) for v, moves in zip(jaxpr.invars, known, strict=True) if moves}
     for equation in jaxpr.eqns:

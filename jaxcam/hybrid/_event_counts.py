@@ -30,7 +30,7 @@ class EventCounts(eqx.Module):
         return EventCounts(*(jnp.zeros(()) for _ in range(5)))
 
     def after(self, kind: Float[Array, ""]) -> "EventCounts":
-        """Return the numbers after an attempted step of this `RowKind`."""
+        """Return the numbers after an attempted step of the given `RowKind`."""
 
         def one_if(which: RowKind):
             return jnp.where(kind == float(which), 1.0, 0.0)

@@ -25,11 +25,12 @@ class Settings(eqx.Module):
 
     tolerance: FloatScalar = 1e-10
     """Relative error allowed per step. The error of each component is relative to the
-    distance that it has moved since the start of the run; at first, it is relative to
-    the distance from the constraint if a gap depends on the component, otherwise to its
-    magnitude. The accuracy is therefore independent of the units and of the origin of a
-    coordinate. However, a coordinate is resolved only to 1e-15 of its value, which
-    limits the resolution of a small gap far from the origin.
+    distance that the component has moved since the start of the run; at first, the
+    error is relative to the distance from the constraint if a gap depends on the
+    component, otherwise to the magnitude of the component. The accuracy is therefore
+    independent of the units and of the origin of a coordinate. However, a coordinate is
+    resolved only to 1e-15 of its value, which limits the resolution of a small gap far
+    from the origin.
     """
     chatter_smallness: FloatScalar = 1e-3
     """Chatter is completed analytically only if lambda/(1 - r) is below this value,
@@ -70,8 +71,8 @@ class Settings(eqx.Module):
     )
     """Compiler for runs that are not traced: `"llvm"`, which is faster but rejects a
     system with an unsupported operation; `"xla"`, which is also used for all traced
-    runs and derivatives; or `"auto"`, LLVM if possible, otherwise XLA (also if JAX runs
-    on a device other than the CPU). With `"cuda"`, batches
+    runs and derivatives; or `"auto"`, which is LLVM if JAX runs on the CPU and LLVM
+    supports the system, otherwise XLA. With `"cuda"`, batches
     ([`jaxcam.hybrid.stroboscope`][], sweeps, basins) run on an NVIDIA GPU, with one
     thread for each trajectory, and all other runs are as with `"llvm"`. Results of the
     backends differ by rounding error or, where a function is not smooth, by the

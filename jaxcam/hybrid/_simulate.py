@@ -76,8 +76,8 @@ def simulate(
         max_step: Longest integration step (s). The solver may step over a force that is
             briefer, or a barrier that is narrower, than one step.
         max_steps: Maximum number of attempted steps. The default is a million; inside
-            `jit`, `vmap`, `jvp` or `grad`, where array sizes must be fixed, it is 4096
-            with padded arrays.
+            `jit`, `vmap`, `jvp` or `grad`, where array sizes must be fixed, it is 4096,
+            and arrays are padded.
         derivatives: "forward", or "reverse" for gradients with respect to hundreds of
             numbers; both support jvp, linearize, grad and hessian. "reverse" always
             performs `max_steps` attempts.
@@ -129,7 +129,7 @@ def simulate(
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps
-        # a scan can be run backward step by step, a loop only as a whole
+        # a scan can be differentiated in reverse step by step, a loop only as a whole
         forward = _forward if settings.plain else whole(_forward)
         of_rows: Callable[..., tuple[Parts, Any]] = (
             _reversible if derivatives == "reverse" else forward
@@ -247,8 +247,8 @@ def _code(carried: LoopState):
 def _trim(parts: Parts) -> Parts:
     def cut(part):
         number = int(part.count)
-        # in numpy: jax would compile a slice for every new length; copied, because a
-        # view would keep the entire log in memory
+        # in numpy, because jax would compile a slice for every new length; the slice is
+        # copied, because a view would keep the entire log in memory
         return jax.tree.map(
             lambda a: np.asarray(a)[:number].copy() if a.ndim else a, part
         )

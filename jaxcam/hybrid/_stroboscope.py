@@ -23,7 +23,7 @@ from .surface import check_restitution, restitutions
 
 # ratio of trajectories in a group to those in a block
 _GROUP = 64
-# numbers in the samples of a group on a GPU, which runs as many at once as there are
+# on a GPU, which runs very many trajectories at once: numbers in the samples of a group
 _ON_GPU = 2**27
 
 
@@ -184,7 +184,7 @@ def stroboscope(
 def _group(lanes: int, width: int, workers: int, least: int) -> int:
     """Return the number of trajectories in a group, which bounds the memory.
 
-    Each group keeps its block busy until its last trajectories.
+    The block is full until the last trajectories of the group.
     """
     shares = -(-lanes // (workers * width))
     return max(width * min(_GROUP, shares), least)
@@ -211,8 +211,8 @@ def _check_times(system, period, turns, skip) -> None:
 
 
 def _check(batched, shared, settings, t0, period, states) -> None:
-    """Raise `ValueError` for trajectories that cannot start; the first is checked
-    fully.
+    """Raise `ValueError` if a trajectory cannot start; only the first is checked in
+    full.
     """
     first = eqx.combine(jax.tree.map(lambda leaf: leaf[0], batched), shared)
     one = jnp.asarray(states[0])
@@ -239,8 +239,8 @@ def _check(batched, shared, settings, t0, period, states) -> None:
 
 @program
 def _starts(batched, shared, period, t0, states):
-    """Return, per trajectory, the smallest gap, whether it penetrates, the period and
-    the coefficients of restitution.
+    """Return, per trajectory, the smallest gap, whether the start penetrates a
+    constraint, the period and the coefficients of restitution.
     """
 
     def one(batched, state):

@@ -144,15 +144,15 @@ class SwitchedSystem(HybridSystem):
         as in time-stepping schemes; the result differs if the slip reverses.
 
         In systems with up to three constraints and more than three states, an impact
-        that occurs while other gaps are closed is treated as an impact on all of these
-        constraints. The coefficient is then Newton's for `"kinematic"` and
-        `"complementarity"`, otherwise Poisson's.
+        that occurs while other gaps are closed is treated as an impact on all
+        constraints whose gaps are closed. The coefficient is then Newton's for
+        `"kinematic"` and `"complementarity"`, otherwise Poisson's.
         """
         return "kinematic"
 
     @property
     def has_contact_friction(self) -> bool:
-        """Return whether the contacts have friction: whether the class defines
+        """Return whether the contacts have friction, that is, whether the class defines
         `contact_friction`.
 
         Override this property in a class whose `contact_friction` calls that of another

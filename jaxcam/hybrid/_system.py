@@ -23,8 +23,8 @@ class HybridSystem(eqx.Module):
     and `impact` returns shape `(m, n)`, one row for each constraint.
 
     Everything else (normal velocity, acceleration and jerk of the gap, the sticking
-    field, release and the sum of the remaining impacts of chatter) is derived from
-    these functions by automatic differentiation.
+    field, release and the completion of chatter) is derived from these functions by
+    automatic differentiation.
 
     Examples:
         >>> class Ball(jaxcam.HybridSystem):

@@ -24,7 +24,7 @@ from .loop import (
 )
 
 
-# rows of a chunk, between which progress is shown and a run can be interrupted
+# rows of a chunk; between chunks, progress is shown and a run can be interrupted
 _CHUNK = 2048
 
 
@@ -33,7 +33,7 @@ def run_untraced(
 ) -> tuple[Log, Any, Int[Array, ""]]:
     """Return log, initial mode and result code of a run of at most `budget` rows.
 
-    A run that has not ended by then has the code `RUNNING`.
+    A run that has not ended after `budget` rows has the code `RUNNING`.
     """
     case = system, settings, t0, state, t1
     if settings.compiles:
@@ -72,7 +72,7 @@ _STARTED = Rowwise(_start, width=1)
 
 
 def _row(record, lane: LoopState):
-    """Record an attempted step as a row."""
+    """Return the place of an attempted step in the log, and the numbers of its row."""
     return lane.steps - 1.0, numbers_of_row(record)
 
 

@@ -31,8 +31,8 @@ def next_breakpoint(breaks, repeat, t):
 
 
 def neighbours(breaks, repeat, t):
-    """Return the last breakpoint at or before `t` and the first after it, or -inf and
-    inf.
+    """Return the last breakpoint at or before `t` and the first after `t`; -inf and inf
+    if there is none.
 
     Breakpoints recur every `repeat` (s), or never if it is inf.
     """
@@ -42,7 +42,7 @@ def neighbours(breaks, repeat, t):
     for b in breaks:
         turns = jnp.floor(jax.lax.stop_gradient((t - b) / again)) + 1
         turns = jnp.where(recurs, turns, 0.0)
-        # rounding may have counted the period that ends here
+        # because of rounding, this time may not be after `t`
         turns = jnp.where(recurs & (b + turns * again <= t), turns + 1, turns)
         time = b + turns * again
         past = jnp.where(recurs, b + (turns - 1) * again, b)

@@ -1,4 +1,4 @@
-"""Keep what has been traced and compiled, and forget it on demand."""
+"""Keep traced and compiled programs, and discard them on demand."""
 
 import threading
 import weakref
@@ -12,9 +12,9 @@ _ALL: "weakref.WeakSet[Cache]" = weakref.WeakSet()
 
 
 class Cache:
-    """Results by their keys; the oldest are forgotten beyond a number.
+    """Results by their keys; beyond a maximum number, the oldest are discarded.
 
-    **Arguments:** the largest number of results.
+    **Arguments:** the maximum number of results.
     """
 
     def __init__(self, most: int = 256):
@@ -25,7 +25,8 @@ class Cache:
         _ALL.add(self)
 
     def get(self, key: Hashable, make: Callable[[], Any], keeps=lambda made: True):
-        """Return the result for a key, made once; it is kept if `keeps(result)`.
+        """Return the result for a key. If there is none yet, it is made, and kept if
+        `keeps(result)`.
 
         **Raises:** `TypeError` if the key is not hashable.
         """
@@ -40,7 +41,7 @@ class Cache:
             return made
 
     def clear(self) -> None:
-        """Forget all results."""
+        """Discard all results."""
         with self._lock:
             self._results.clear()
 

@@ -19,7 +19,7 @@ from .surface import check_restitution, restitutions
 
 
 def refuse_tracers(name: str, instead: str, *arguments) -> None:
-    """Raise `ValueError` for a function that JAX cannot transform.
+    """Raise `ValueError` if an argument of a function that JAX cannot trace is traced.
 
     Args:
         name: Name of the function.
@@ -74,8 +74,8 @@ _STARTS_BEHIND = Rowwise(lambda case, _: starts_behind(*case), width=1)
 _RESTITUTIONS = Rowwise(lambda case, _: restitutions(*case), width=1)
 
 
-# systems that passed, because a check takes as long as a short run: by their shapes,
-# and by all their numbers
+# systems that have passed the checks, by their shapes and by all their numbers; they
+# are not checked again, because a check takes as long as a short run
 _WELL_SHAPED: set = set()
 _SOUND: set = set()
 _MANY = 1000
@@ -175,7 +175,7 @@ def _check_shapes(system, t0, state) -> None:
 
 
 def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
-    """Check the results of the functions of switching surfaces."""
+    """Check and return the shapes of the results of functions of switching surfaces."""
     switch = _shape(system, "switching", t0, state)
     if len(switch.shape) > 1 or switch.shape == (0,):
         raise ValueError(

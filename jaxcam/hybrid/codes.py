@@ -17,7 +17,7 @@ class RowKind(enum.IntEnum):
     CONTACT = 4
     RELEASE = 5
     STOP = 6
-    # the crossing of a switching surface, and the begin and end of sliding along it
+    # the crossing of a switching surface, and the beginning and end of sliding along it
     SWITCH = 7
     SLIDE = 8
     LEAVE = 9

@@ -33,8 +33,8 @@ def is_tracing() -> bool:
 def program(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a function when it is first called, as `equinox.filter_jit` does.
 
-    This takes about half the time, and the program runs as fast. Within `jit`, `vmap`,
-    `jvp` and `grad`, it is compiled with the usual options.
+    Compilation takes about half the usual time, and the program runs as fast. Within
+    `jit`, `vmap`, `jvp` and `grad`, the function is compiled with the usual options.
 
     Args:
         function: The function.
@@ -43,8 +43,8 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
         The compiled function.
     """
     jitted: Any = eqx.filter_jit
-    # JAX refuses options within other transformations, whose values a function may
-    # have captured
+    # JAX rejects options within other transformations, from which a function may have
+    # captured values
     inner, outermost = jitted(function), jitted(function, compiler_options=_OPTIONS)
 
     @functools.wraps(function)

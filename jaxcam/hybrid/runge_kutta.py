@@ -85,8 +85,8 @@ error estimate.
 class Squared(NamedTuple):
     """Coefficients of a component whose rate is another component, y'' = f.
 
-    The stages are y + c h y' + h^2 times the sum of `lower` times f, so the rates of
-    the component itself are not summed, and those of y' only if f depends on it.
+    The stages of y are y + c h y' + h^2 times the sum of `lower` times f. They do not
+    use the stages of y', which are needed only if f depends on y'.
     """
 
     lower: tuple[tuple[float, ...], ...]
@@ -126,7 +126,7 @@ def _combine(weights, stages, i):
 def step(tableau: Tableau, field, t, x: tuple, h):
     """Take one step of length `h` from `(t, x)`.
 
-    **Arguments:** `field(t, x)` and `x` work on tuples of scalars.
+    **Arguments:** `x` and the result of `field(t, x)` are tuples of scalars.
 
     Returns:
         The state after the step, the error estimate, and the stages.
@@ -168,8 +168,8 @@ def rates_among(x, rates) -> dict[int, int]:
         for j, component in enumerate(x):
             if rate is component and i != j:
                 found[i] = j
-    # the rate itself is integrated directly, because otherwise there would be a third
-    # level
+    # a component whose rate also has its rate among the components is integrated
+    # directly, because otherwise there would be a third level
     return {i: j for i, j in found.items() if j not in found}
 
 
@@ -232,8 +232,8 @@ def array_step(
 
 
 def _weighted(weights, rates):
-    """Return the weighted sum of the stages; with derivatives, a matrix product is
-    slower.
+    """Return the weighted sum of the stages, not by a matrix product, which is slower
+    with derivatives.
     """
     return jnp.sum(weights[:, None] * rates, axis=0)
 

@@ -16,7 +16,8 @@ class WithSection(SwitchedSystem):
     """A system with a Poincaré section as its last switching surface.
 
     The section changes neither the vector field nor the state. Steps end at it, and the
-    event loop counts its crossings in one direction, without those by impacts.
+    event loop counts its crossings in the given direction, except those caused by
+    impacts.
     """
 
     system: HybridSystem
@@ -45,7 +46,7 @@ class WithSection(SwitchedSystem):
         return jnp.append(own, jnp.where(self.function(t, state) >= 0, 1.0, -1.0))
 
     def reset(self, t, state, sides):
-        """Return the states after the crossings of the system, then the state."""
+        """Return the states after resets of the system, then the unchanged state."""
         if not isinstance(self.system, SwitchedSystem):
             return state[None]
         own = jnp.atleast_2d(self.system.reset(t, state, sides[:-1]))

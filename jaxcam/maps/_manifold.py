@@ -128,7 +128,8 @@ def grow_manifold(
         )
     times = 2 if stretch < 0 else 1
     ratio = abs(stretch) ** times
-    # equidistant in the logarithm of the distance, which the map shifts
+    # equidistant in the logarithm of the distance from the saddle, because each
+    # iteration of the map adds a constant to this logarithm
     fractions = np.linspace(0.0, 1.0, 24)
     pieces, grown, order = [point[None]], 0.0, 0
     total = 1

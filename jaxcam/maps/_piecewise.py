@@ -99,5 +99,5 @@ class SquareRootMap(PiecewiseMap):
 
     def right(self, x) -> jax.Array:
         """Return mu - root sqrt(x)."""
-        # not used on the other side, but finite and differentiable there
+        # for x <= 0 the value is not used, but it must be finite and differentiable
         return self.mu - self.root * jnp.sqrt(jnp.where(x > 0, x, 1.0))

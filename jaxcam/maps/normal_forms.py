@@ -31,7 +31,8 @@ class NormalForm(NamedTuple):
         mu = np.atleast_1d(np.asarray(mu, dtype=float))
         x = np.asarray(self.branches[branch](mu), dtype=float)
         slope = jax.vmap(jax.grad(self.field))(jnp.asarray(x), jnp.asarray(mu))
-        # for a period-two orbit of an odd map, the square of the slope there
+        # the multiplier of a period-two orbit of an odd map is the square of the slope,
+        # so the same condition applies
         return np.abs(slope) < 1 if self.discrete else np.asarray(slope) < 0
 
 

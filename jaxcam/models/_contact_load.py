@@ -15,7 +15,9 @@ from .cams import flat_oscillating_contour, MotionPieces, MotionProgram, profile
 _TURN = 2 * np.pi
 _SAMPLES = 1025
 _HALVINGS = 60
-"""Number of golden-section iterations, from two steps of the scan to rounding."""
+"""Number of golden-section iterations, which reduce two steps of the scan to rounding
+error.
+"""
 _GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -71,8 +73,8 @@ def contact_force(
         system: The system.
         cam_angles: Cam angles (rad), counted as in the profile, shape
             `(angles,)`.
-        center: Position of the cam axis relative to the hinge (m); known for an
-            eccentric circle.
+        center: Position of the cam axis relative to the hinge (m); not required for an
+            eccentric circle, which defines it.
 
     Returns:
         Contact forces, shape `(angles,)`.
@@ -187,7 +189,7 @@ def _sharpest_fall(profile):
     if not isinstance(profile, MotionProgram):
         return jnp.zeros(()), jnp.zeros(())
     angles, jumps = profile.joints()
-    # smaller jumps are rounding of slopes of this size
+    # smaller jumps are rounding errors of the slopes
     scale = 1e-9 * jnp.max(jnp.abs(profile.rises / profile.widths))
     falls = jnp.where(jumps[:, 1] < -scale, jumps[:, 1], 0.0)
     first = jnp.argmin(falls)

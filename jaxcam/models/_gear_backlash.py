@@ -27,7 +27,7 @@ class GearBacklash(SwitchedSystem):
         x < -clearance.
 
     The state is (x, x'). Time is in units of the inverse natural frequency of the pair
-    with its teeth in contact. The damping models the bearings and acts even if the
+    with its teeth in contact. The damping models the bearings and acts even while the
     teeth are separated.
 
     A. Kahraman, R. Singh, Non-linear dynamics of a spur gear pair, Journal of Sound and

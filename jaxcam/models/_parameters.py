@@ -14,7 +14,7 @@ def as_parameter(value) -> jax.Array:
 
 
 def parameter(default=None):
-    """Declare a floating-point field; without a default, it must be given."""
+    """Declare a floating-point field; without a default, a value must be given."""
     if default is None:
         return eqx.field(converter=as_parameter)
     return eqx.field(default=default, converter=as_parameter)

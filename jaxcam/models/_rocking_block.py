@@ -80,7 +80,8 @@ class RockingBlock(HybridSystem):
         floor = self.amplitude * jnp.cos(self.omega * t)
         sine, cosine = jnp.sin(angle), jnp.cos(angle)
         diagonal = self.half_width**2 + self.half_height**2
-        # one corner in contact then gives the equation of rocking about it
+        # with this factor, contact at one corner gives the equation of rocking about
+        # that corner
         scale = (1 + self._share) / (4 / 3 * diagonal)
         turn = self.half_height * (self.gravity * sine - floor * cosine)
         press = self.half_width * (self.gravity * cosine + floor * sine)

@@ -21,7 +21,9 @@ _TURN = 2 * np.pi
 _NEAR = 4e-12
 """Tolerance of gap and velocity in contact, relative to the size of the state."""
 _BEHIND = 2e-4
-"""Penetration depth at which a body that moves into the surface is placed."""
+"""Penetration depth at which a body that moves into the surface is placed, in units of
+the tolerance.
+"""
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 
@@ -130,8 +132,8 @@ def _piece(pieces: MotionPieces, angle) -> OnePiece:
 def _settled(system, t, state):
     """Remove rounding errors of gap and velocity from a state in contact.
 
-    If the next piece moves into the follower, it begins with an impact, which requires
-    a gap that is not positive.
+    If the surface of the next piece moves into the follower, the next run begins with
+    an impact, which requires a gap that is not positive.
     """
     t = jnp.asarray(t, dtype=float)
     near = _NEAR * (1.0 + jnp.max(jnp.abs(state)))

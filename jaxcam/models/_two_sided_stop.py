@@ -18,8 +18,8 @@ class TwoSidedStop(HybridSystem):
     """Forced linear oscillator between two rigid stops, dimensionless.
 
     `x'' + 2 damping x' + x = amplitude cos(omega t)` with `-clearance <= x <=
-    clearance`; the state is (x, x'). The symmetric orbits that touch each stop once in
-    a forcing period are known in closed form.
+    clearance`; the state is (x, x'). The symmetric orbits with one impact per forcing
+    period at each stop are known in closed form.
 
     S. W. Shaw, The dynamics of a harmonically excited system having rigid amplitude
     constraints, Journal of Applied Mechanics 52 (1985), 453-464.

@@ -192,7 +192,7 @@ class WoodpeckerToy(SwitchedSystem):
 
     @property
     def _slips(self) -> jax.Array:
-        """Slip velocities per unit of the velocities, shape `(2, 3)`."""
+        """Matrix that maps the velocities to the slip velocities, shape `(2, 3)`."""
         one = jnp.ones_like(self.beak_height)
         behind = self.bird_offset - self.beak_length
         return jnp.stack(

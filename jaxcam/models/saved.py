@@ -133,8 +133,8 @@ def system_to_json(
 
 
 def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSystem:
-    """Return the system described by plain JSON; see `load_system`. Other keys are
-    ignored.
+    """Return the system described by plain JSON; see `load_system`. Keys that are not
+    part of the format are ignored.
 
     Args:
         found: The parsed JSON.

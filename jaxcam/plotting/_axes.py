@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 
-# in units of the font size of the legend
+# number of letters of a legend that fit into one inch
 _LETTERS_PER_INCH = 12.5
 
 

@@ -75,7 +75,8 @@ def basin_picture(
     )
     colours, handles = _colours(basins, orbits)
     low, high = (np.array(corner)[list(axes)] for corner in (grid.low, grid.high))
-    # white below, one colour per attractor, grey for the others
+    # index 0 (white) for states without an attractor, then one index per attractor, and
+    # the last (grey) for all further attractors
     index = np.where(number < 0, 0, np.minimum(number, len(colours) - 2) + 1)
     image = ax.imshow(
         _finer(index, len(colours)).T,
@@ -117,7 +118,7 @@ def _finer(index, count: int) -> np.ndarray:
     factor = -(-_FINE // min(index.shape))
     if factor == 1:
         return index
-    # odd, so that a cell has a centre
+    # odd, so that one of the small cells is at the centre of a cell
     factor += 1 - factor % 2
     cells = np.kron(index, np.ones((factor, factor), dtype=int))
     finer, most = np.zeros_like(cells), np.zeros(cells.shape)
@@ -126,7 +127,8 @@ def _finer(index, count: int) -> np.ndarray:
             share = gaussian_filter(
                 (cells == region).astype(float), _BLUR * factor, mode="nearest"
             )
-            # inadmissible states, if there are more of them than in all basins together
+            # states without an attractor win only if they cover more than half of the
+            # neighbourhood
             least = 0.5 if region == 0 else most
             finer = np.where(share > least, region, finer)
             most = np.where(share > least, share, most)
@@ -166,7 +168,9 @@ def _mark(ax: Axes, basins, axes) -> None:
 
 
 def _mark_of(basins, k: int) -> dict:
-    """Return the marker of attractor `k`: white is visible on every colour."""
+    """Return the marker of attractor `k`; it is white, which is visible on every
+    colour.
+    """
     # a non-periodic attractor has many points
     irregular = basins.labels[k, 1] == 0
     return {

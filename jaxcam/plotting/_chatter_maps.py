@@ -1,4 +1,4 @@
-"""Draw the maps of chatter theory: lambda-map, and lobes with their scales."""
+"""Draw the maps of chatter theory: the lambda-map, and the lobes with their scaling."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -83,8 +83,8 @@ def compare_recording(
     above.plot(
         over[keep],
         samples[keep],
-        # wide and pale, so that it is visible behind a simulation that coincides with
-        # it
+        # the recording is wide and pale, so that it remains visible behind a simulation
+        # that coincides with it
         color=RECORDED,
         linewidth=4.5,
         label="recorded",

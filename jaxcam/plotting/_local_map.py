@@ -43,7 +43,8 @@ def local_map(
     ax = one_axes(ax)
     x_0, x_inf = float(local.x_0), float(local.x_inf)
     span = x_0 - x_inf
-    # dense at every corner: equal steps in the depth, then in the root
+    # equal steps, and equal steps in the cube root of the distance from x_0, where the
+    # slope is infinite
     x = np.unique(
         np.concatenate(
             [

@@ -89,8 +89,8 @@ def residual_by_mode(
     )
     right.set_xlabel("fraction (%)")
     grid[0, 1].set_title("line: noise alone", fontsize="small")
-    # for all rows; compared with a large residual, the noise fills one bin, which may
-    # be truncated
+    # The limit is common to all rows. If a residual is large, the noise alone fills a
+    # single bin, and the line may be truncated there.
     right.set_xlim(0.0, 1.25 * highest)
     if against == "phase":
         left.set_xticks(np.arange(5) * np.pi / 2, _ANGLE_TICKS)

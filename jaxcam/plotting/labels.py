@@ -59,4 +59,3 @@ def speed_unit(system: HybridSystem) -> str:
     if time == "-":
         return unit
     return f"1/{time}" if unit in ("-", "") else f"{unit}/{time}"
-

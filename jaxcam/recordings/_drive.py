@@ -51,7 +51,8 @@ class Drive:
 def read_drive(recording: Recording, channel: str = "cam_angle_rad") -> Drive:
     """Smooth the encoder of a drive with local parabolas over 50 ms.
 
-    **Raises:** `RecordingError` if the recording is shorter, or the drive is at rest.
+    **Raises:** `RecordingError` if the recording is shorter than that, or the drive is
+    at rest.
     """
     raw = recording[channel]
     if np.any(np.abs(np.diff(raw)) > np.pi):

@@ -11,8 +11,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 # Lengths of the cubics, relative to those of the parabolas that smooth the angle
 _LENGTHS = (20, 10, 5, 2.5)
-# Mean square of the difference between two lengths, relative to that of its noise,
-# below which the longer one is kept
+# The results for two lengths are compared by the mean square of their difference,
+# divided by the mean square that noise causes; below this ratio, the longer one is kept
 _SAME = 2.0
 
 
@@ -25,7 +25,7 @@ class DriveAcceleration:
     stderr: float
     """Its standard error, due to the noise and to the smoothing."""
     length: float
-    """Length (s) of the cubics, over which the error hardly changes."""
+    """Length (s) of the cubics; over shorter times, the error hardly changes."""
 
 
 def drive_acceleration(
@@ -33,7 +33,8 @@ def drive_acceleration(
 ) -> DriveAcceleration:
     """Estimate the acceleration by local cubics.
 
-    Shorter cubics are chosen while their result differs by more than the noise.
+    Shorter cubics are chosen as long as their result differs from that of longer ones
+    by more than the noise.
 
     Args:
         angle: Samples of the angle of the drive (rad).
@@ -65,9 +66,9 @@ def drive_acceleration(
         if square < _SAME * random:
             break
         chosen, bias = narrow, bias * ratio**2
-    # at the ends of a recording, the curvature is not taken in the middle of a cubic
-    # but at some u (1 at its end): its variance is 1 + 35 u^2 times, the error due to
-    # the fourth derivative 1 - 7 u^2 times that in the middle
+    # near the ends of a recording, the curvature is taken not in the middle of a cubic
+    # (u = 0) but closer to its end (u = 1); its variance is then 1 + 35 u^2 times, and
+    # its error due to the fourth derivative 1 - 7 u^2 times, the value in the middle
     share = counts[chosen] / len(angle)
     own = (1 + 35 / 3 * share) * noise**2 * float(np.sum(kernels[chosen] ** 2))
     bias *= 1 + 77 / 15 * share

@@ -82,7 +82,9 @@ class Wandering(HybridSystem):
         return self.phase(self.base) + self.speed(self.base) * (t + self.depth * wander)
 
     def at(self, t) -> HybridSystem:
-        """Return the base with a uniform drive that has the angle and speed at `t`."""
+        """Return the base system with a drive of constant speed that has, at `t`, the
+        same angle and speed as the drifting one.
+        """
         angle, rate = jax.jvp(self.angle, (t,), (jnp.ones_like(t),))
         here = rate, angle - rate * t
         return eqx.tree_at(lambda s: (self.speed(s), self.phase(s)), self.base, here)
@@ -91,7 +93,8 @@ class Wandering(HybridSystem):
         return self.at(t).vector_field(t, state)
 
     def gap(self, t, state):
-        # only the angle matters here; its rate of change follows
+        # shifting the phase is enough: only the angle matters here, and its rate of
+        # change, obtained by differentiation, is also correct
         phase = self.angle(t) - self.speed(self.base) * t
         base = eqx.tree_at(lambda s: self.phase(s), self.base, phase)
         return base.gap(t, state)

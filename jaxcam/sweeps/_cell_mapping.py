@@ -29,7 +29,8 @@ def cell_mapping(
     turns: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> CellMapping:
-    """Map the centre of each cell, and follow cell sequences (simple cell mapping).
+    """Map the centre of each cell, and follow the resulting sequences of cells (simple
+    cell mapping).
 
     All states outside the grid and all inadmissible states form one sink cell, which
     maps to itself. The method is an approximation, in which a cycle of small cells
@@ -88,7 +89,8 @@ def follow_cells(image, shape) -> CellMapping:
     for _ in range(doublings):
         smallest = np.minimum(smallest, smallest[far])
         far = far[far]
-    # after this many iterations, all are on a cycle, identified by its smallest cell
+    # after this many iterations, every cell has reached a cycle, identified by its
+    # smallest cell
     cyclic = np.zeros(count + 1, dtype=bool)
     cyclic[far] = True
     name = smallest[far]

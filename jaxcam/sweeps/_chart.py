@@ -26,8 +26,8 @@ from .sections import AbstractSection
 
 
 _LANES = 1024
-"""Number of motions in a block, smaller than in other sweeps because exponents take
-long.
+"""Number of motions in a block, smaller than in other sweeps because exponents take a
+long time to compute.
 """
 
 

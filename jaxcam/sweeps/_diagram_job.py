@@ -24,7 +24,7 @@ _CHAIN = 16
 
 
 class DiagramJob(AbstractJob):
-    """Computes every value independently."""
+    """Computes the motions at all values independently."""
 
     chained = False
 
@@ -112,8 +112,8 @@ class DiagramJob(AbstractJob):
 
 
 class CarriedJob(DiagramJob):
-    """Computes values upwards, downwards or both, each from the final state of the
-    previous one.
+    """Computes the motions at increasing values, decreasing values or both; each motion
+    starts from the final state of the previous one.
     """
 
     chained = True
@@ -175,9 +175,10 @@ def each_value(section, where, values, starts, turns, keep, period_tolerance) ->
 def one_after_the_other(
     section, where, values, starts, first, carried, turns, keep, room, period_tolerance
 ) -> Arrays:
-    """Compute some values in order; `first` marks those that start again.
+    """Compute the motions at some values in order; `first` marks those that start from
+    the given initial states.
 
-    **Arguments:** `turns`, `keep`: numbers for each value; `room`: capacity for
+    **Arguments:** `turns`, `keep`: one number for each value; `room`: capacity for
     samples, padded with NaN.
     """
     rows = []

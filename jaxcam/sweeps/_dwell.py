@@ -1,5 +1,5 @@
-"""Compute a diagram as in an experiment: wait at each value, then record (in
-seconds).
+"""Compute a diagram as in an experiment: wait at each value, then record, for times
+given in seconds.
 """
 
 import functools
@@ -49,7 +49,7 @@ def dwell_turns(
 
 
 class DwellJob(CarriedJob):
-    """Computes values upwards, downwards or both, for times given in seconds."""
+    """Computes the motions of a sweep, for settling and recording times in seconds."""
 
     def __init__(self, *arguments, dwell: tuple[float, float]):
         self.dwell = dwell

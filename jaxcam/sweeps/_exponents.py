@@ -106,7 +106,9 @@ def _within(progress, begun: float, size: float, share: float) -> None:
 
 
 def _together(system, where, values, lanes):
-    """Return motions for one call, their system, and its varying parameters."""
+    """Yield the motions of each call, their system, and its varying parameter and
+    values.
+    """
     everybody = np.arange(lanes)
     if where is None:
         yield everybody, system, None, None

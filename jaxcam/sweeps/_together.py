@@ -74,8 +74,8 @@ def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Datas
 
 
 def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
-    """Return the final points of the motions that represent the attractors, in
-    order.
+    """Return the final points of the motions that represent the attractors, in the
+    order of the attractors.
     """
     turns, keep, period_tolerance, reruns = job.settings
     n = len(job.grid.shape)

@@ -43,10 +43,11 @@ def events(up: Diagram, down: Diagram) -> Events:
     """Return the events of the upward and downward sweeps.
 
     Contact, the orbits that follow from it, and the beginning of aperiodic motion are
-    taken from the upward sweep; orbits with one impact per cycle from the downward
-    sweep, P(1,1) below its doubled orbit P(2,2). The chatter route to chaos begins
-    after the last speed with P(inf,1). It ends, with the resulting chaos, at the first
-    upward speed on the period-doubling cascade or, failing that, at the last speed.
+    taken from the upward sweep; orbits with one impact per cycle are taken from the
+    downward sweep. P(1,1) is only sought at speeds below those of its doubled orbit
+    P(2,2). The chatter route to chaos begins after the last speed with P(inf,1). It
+    ends, with the resulting chaos, at the first upward speed on the period-doubling
+    cascade or, failing that, at the last speed.
     """
     contact = label_spans(up, "contact", 1)[0]
     sticking = label_spans(up, "P(inf,1)", 1)[0]

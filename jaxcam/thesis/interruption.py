@@ -39,7 +39,8 @@ def interruption(system: CamFollower) -> CamFollower:
         ends = np.array([middle - _RANGE / 2, middle + _RANGE / 2])
         low, high = np.asarray(rpm_to_rad_s(ends))
         found = _search(system, low, high)
-        # above it chatter is interrupted; at detachment it is the reverse
+        # above the interruption, the chatter is incomplete; at detachment, it is the
+        # reverse
         if bool(found.converged) and found.ends[0] < 0 < found.ends[1]:
             return at_speed(system, found.value)
     far = _RANGE * (_RANGES + 0.5)
@@ -68,9 +69,9 @@ def beside_interruption(system: CamFollower, rpm: float) -> float:
 
 
 def reference(system: CamFollower) -> CamFollower:
-    """Return the rig at the distance of Table 6.1 below its interruption.
+    """Return the rig at a speed as far below its interruption as that of Table 6.1.
 
-    Close to the interruption chatter depends only on that distance.
+    Close to the interruption, chatter depends only on the distance from it.
     """
     below = float(rpm_to_rad_s(INTERRUPTION - REFERENCE))
     return at_speed(system, speed_of(interruption(system)) - below)

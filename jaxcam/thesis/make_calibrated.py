@@ -1,12 +1,12 @@
 """Recover the parameters of the rig of the thesis from Tables 5.2 and 6.1.
 
 Table 4.4 is rounded, the spring was refitted afterwards, and the thesis gives neither
-the restitution law nor the sense of rotation. This module finds them:
+the restitution law nor the sense of rotation. This module recovers all of these:
 
 1. Free flight is conservative, so the product of the two multipliers of P(1,1) is r^2.
    The law is a straight line through the ten values of r from Table 5.2.
-2. Seven parameters start at Table 4.4 with a tolerance of 2 % and are fitted to the
-   sums of the multipliers from 147.9 to 153.4 rpm and to Table 6.1.
+2. Seven parameters start at their values in Table 4.4, with a tolerance of 2 %, and are
+   fitted to the sums of the multipliers from 147.9 to 153.4 rpm and to Table 6.1.
 3. Both senses of rotation are tried. Only one fits.
 
 Run it as `python -m jaxcam.thesis.make_calibrated` to print the parameters of
@@ -97,7 +97,9 @@ def nominal_rig(rotation: str = "clockwise") -> CamFollower:
 
 
 def free(observed: Observed):
-    """Return the fitted numbers in the order of `NAMES`; x0 and J only set scales."""
+    """Return the fitted numbers in the order of `NAMES`; x0 and J only set scales and
+    are fixed.
+    """
     system = observed.system
     return [
         system.profile.eccentricity,  # pyright: ignore

@@ -47,8 +47,8 @@ def multipliers_at(system: CamFollower, start: ImpactOrbit, rpm: float) -> np.nd
 
 
 def ordered_multipliers(matrix) -> np.ndarray:
-    """Return the eigenvalues, larger magnitude last; complex pairs in the order -,
-    +.
+    """Return the eigenvalues, ordered by magnitude; a complex pair is ordered by its
+    imaginary parts.
     """
     matrix = np.asarray(matrix)
     if not np.all(np.isfinite(matrix)):
@@ -59,15 +59,18 @@ def ordered_multipliers(matrix) -> np.ndarray:
     return values[np.argsort(np.abs(values))]
 
 
-# A line in the plane of trace and product of the multipliers: trace = a + b product. a
-# = b = 1 is a fold, a = b = -1 a flip, and b = 0 specifies a trace.
+# Lines (a, b) in the plane of the sum (trace) and the product of the multipliers: trace
+# = a + b product. a = b = 1 is a fold, a = b = -1 is a flip, and b = 0 specifies a
+# trace.
 FOLD, FLIP = (1.0, 1.0), (-1.0, -1.0)
 
 
 def point_on_line(
     system: CamFollower, guess: SpecialPoint, line: tuple[float, float]
 ) -> SpecialPoint:
-    """Return the point of the branch on such a line; `guess.parameter` is in rad/s."""
+    """Return the point of the branch on a line (a, b) as defined above;
+    `guess.parameter` is in rad/s.
+    """
     system = eqx.tree_at(speed_of, system, guess.parameter)
     return _point(system, guess.orbit, jnp.asarray(line[0]), jnp.asarray(line[1]))
 

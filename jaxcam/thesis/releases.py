@@ -1,5 +1,5 @@
-"""Simulate cycles from the release of a sticking orbit, to see whether the next one
-sticks.
+"""Simulate cycles from the release of a sticking orbit, to see whether the follower
+sticks again.
 """
 
 import jax.numpy as jnp
@@ -18,7 +18,7 @@ from .target import Rows, Target
 
 
 _LOOKS = 8
-"""Times in a period at which a release is searched for."""
+"""Number of times in a period at which the search for a release starts."""
 
 
 def released_turn(system: CamFollower, rpm: float) -> Trajectory:

@@ -28,9 +28,9 @@ class ShownMotion(NamedTuple):
     state: tuple[float, float] | None
     """State at time zero; None is contact at rest."""
     impacts: float
-    """Printed P(impacts, turns); zero impacts mean permanent contact, zero turns chaos.
-    """
+    """Impacts m of the printed label P(m, n); zero means permanent contact."""
     turns: int
+    """Periods n of the printed label P(m, n); zero means chaos."""
     name: str = ""
 
     @property
@@ -44,8 +44,9 @@ class SettledMotion(NamedTuple):
 
     case: ShownMotion
     impacts: int
-    """Number of turns, as in `jaxcam.sweeps.attractors.Labels`."""
+    """Number of impacts, as in `jaxcam.sweeps.attractors.Labels`."""
     turns: int
+    """Number of turns, as in `jaxcam.sweeps.attractors.Labels`."""
     rests: int
     """Number of contact intervals in one orbit, or in all the turns kept."""
     state: Float[np.ndarray, " 2"]

@@ -128,8 +128,8 @@ def _run(system, state, first, t0, h):
         free = x + h * field(middle, half)
         behind = gaps(system, end, free) <= 0
         directions = normal_directions(system, end, free)
-        # the jump occurs at mid-step, and its effect on the rest of the step is a
-        # derivative
+        # the jump occurs at mid-step; its effect on the rest of the step is found by
+        # differentiation
         moves = jax.vmap(
             lambda d: d + h / 2 * jax.jvp(lambda y: field(end, y), (free,), (d,))[1]
         )(directions)
@@ -138,7 +138,8 @@ def _run(system, state, first, t0, h):
             return normal_velocity(system, end, y)
 
         gradient = jax.jacfwd(speed)(free)
-        # the effect of an impact at mid-step on the end state, or rest if there is none
+        # lower bound of the normal velocity at the end: that after an impact at
+        # mid-step, or zero if there is none
         after = impacts(system, middle, half)
         later = jax.vmap(lambda y: y + h / 2 * field(middle, y))(after)
         least = jnp.maximum(jnp.diagonal(jax.vmap(speed)(later)), 0.0)

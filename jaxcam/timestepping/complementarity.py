@@ -11,7 +11,8 @@ from ..hybrid.programs import program
 
 # entries of the tableau below this fraction of the largest one are rounding errors
 _TINY = 1e-12
-# no vertex is visited twice, and only a few of the 2^m are visited
+# maximum number of pivots per row (plus 40): no vertex is visited twice, and only a few
+# of the 2^m vertices are visited
 _PIVOTS = 40
 
 SOLVED, RAY, EXHAUSTED = 0, 1, 2

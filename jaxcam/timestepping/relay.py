@@ -18,9 +18,9 @@ def _matrix(value) -> jax.Array:
 
 class RelaySystem(eqx.Module):
     """Linear system with relays: x' = A x + B u, y = C x + D u, where each u_i is the
-    relay output for -y_i.
+    output of a relay controlled by y_i.
 
-    A relay outputs 1 for y < 0, -1 for y > 0, and any value in between for y = 0, as
+    The output u is 1 for y < 0, -1 for y > 0, and any value in between for y = 0, as
     sliding requires (thesis, eq. 3.1). D is zero by default.
 
     Raises:
@@ -57,7 +57,8 @@ class RelaySystem(eqx.Module):
 def relay_problem(
     matrix: Float[Array, "m m"], vector: Float[Array, " m"]
 ) -> tuple[Float[Array, " m"], Float[Array, " m"], Pivoting]:
-    """Solve y = M u + q, where each u_i is the relay output for -y_i (thesis, eq. 3.3).
+    """Solve y = M u + q, where each u_i is the output of a relay controlled by y_i
+    (thesis, eq. 3.3).
 
     This is a complementarity problem of twice the size, between 1 + u and the positive
     part of y, and between 1 - u and the negative part of y. Because u is bounded, the

@@ -57,7 +57,7 @@ def _impacts(along: Line, value):
 
 @program
 def _thresholds(along: Line, near, far, numbers):
-    """Bisect on the number of impacts, an integer that falls with distance."""
+    """Bisect on the number of impacts, which decreases away from the interruption."""
 
     def one(number):
         def halve(carry):

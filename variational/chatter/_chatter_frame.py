@@ -127,8 +127,8 @@ def prepared_frame(system, time) -> ChatterFrame:
     period = system.period
     grid = time + period * jnp.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # nothing sticks at the largest contact acceleration: the release is the last one
-    # before it
+    # contact is impossible where the contact acceleration is largest: take the last
+    # release before that time
     found = release_point(system, grid[jnp.argmax(push)])
     release = found.time + jnp.where(found.time < time, period, jnp.zeros_like(period))
 

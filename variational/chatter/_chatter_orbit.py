@@ -135,7 +135,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
     half = law.lambda_bar / 2
 
     def coordinate(tau, speed):
-        # there is none after release: use an invalid number
+        # lambda does not exist after release: replace tau by a valid number
         early = tau < -_NEAR * period
         safe = jnp.where(early, tau, -period)
         return early, speed / (frame.jerk * safe * safe)

@@ -19,8 +19,8 @@ from ._section_turn import section_turn
 
 # number of states that are followed together
 _ROW = 32
-# maximum number of rows used to narrow a bracket; it ends earlier at two neighbouring
-# floats
+# maximum number of rows used to narrow a bracket; the search ends earlier if the ends
+# of the bracket are neighbouring floats
 _PASSES = 12
 
 
@@ -98,7 +98,7 @@ def find_lobes(
         )
     along = along / along[component]
     scan = base + np.asarray(deviations, dtype=float)
-    # of the scan, the brackets, the points of the lobes, and three single ones
+    # rows of the scan, the brackets, the points of the lobes, and three single rows
     total = _rows(len(scan)) + (most + 2) * _PASSES + _rows(most * samples) + 3
     turn = _Rows(
         lambda row: _turns(system, state, along, row, phase, component), total, progress
@@ -109,7 +109,7 @@ def find_lobes(
             "The deviations stay on one side of the interruption: chatter is complete "
             "for all of them or for none. Use a wider range with both signs."
         )
-    # outwards from the last motion that sticks
+    # the bracket leads outwards from the last motion that sticks
     edge = np.flatnonzero(np.diff(stuck.astype(int)))[0]
     inner, outer = (edge, edge + 1) if stuck[edge] else (edge + 1, edge)
     bottom, top = _bisect(turn, float(scan[inner]), float(scan[outer]), lambda n, s: s)

@@ -82,7 +82,7 @@ def grazing_manifold(
 def _manifold(system, n, points, horizon) -> GrazingManifold:
     grid = system.period * jnp.linspace(0.0, 1.0, 4 * points, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # all times without contact, evenly distributed, wherever they are in the period
+    # times without contact, sampled evenly wherever they are in the period
     order = jnp.argsort(push <= 0, stable=True)
     count = jnp.sum(push > 0)
     picks = order[(jnp.arange(points) * count) // points]
@@ -96,7 +96,7 @@ def _manifold(system, n, points, horizon) -> GrazingManifold:
             s, x, speed, going = carry
             point = next_impact(field, s, x, speed, horizon * system.period)
             going = going & point.found
-            # backwards, the approach speed is the rebound speed of the impact
+            # in reversed time, the approach speed is the rebound speed of the impact
             found = jnp.abs(point.approach) if sense < 0 else point.speed
             pair = jnp.stack([sense * point.time, found])
             carry = (point.time, point.state, point.speed, going)
@@ -165,8 +165,8 @@ def _boundary(system, points, impacts, near) -> ImpactCurve:
     def chain(tau, speed):
         time = frame.release + tau
         state = surface_state(system, time, speed)
-        # backwards, the impact comes first: from the rebound speed to the approach
-        # speed
+        # in reversed time, the impact comes first, and changes the rebound speed to the
+        # approach speed
         start = backwards.impact(-time, state)
         arrived = speed / frame.restitution
 

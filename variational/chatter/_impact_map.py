@@ -19,7 +19,7 @@ from ._impact_search import frozen, longest_step, search_step, take_off
 from ._scalar import one_constraint
 
 
-# maximum number of attempts
+# maximum number of attempted steps
 _MOST_STEPS = 4096
 _GAUSS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _GAUSS, _GAUSS_WEIGHTS = (_GAUSS + 1) / 2, _GAUSS_WEIGHTS / 2

@@ -3,8 +3,8 @@
 This is separate from the event loop of `jaxcam.hybrid`, because it computes gaps with
 high relative accuracy and can be differentiated twice. A step is the same program
 whether it searches for the next impact, ends at it or finds the lowest point of a
-flight, so a loop over steps compiles quickly. Its forward derivative is that of the
-motion with fixed step lengths, corrected at the impact.
+flight, so a loop over steps compiles quickly. The forward derivative of a step is that
+of the motion with fixed step lengths, corrected at the impact.
 """
 
 from typing import NamedTuple
@@ -19,20 +19,22 @@ from jaxcam.hybrid.surface import normal_acceleration
 from ._free_flight import flight_rates, on_flight, runge_kutta_step, TOLERANCE
 
 
-# a minimum of the gap is searched for within one step, which must not contain two
+# forcing period / longest step: a step must not contain two minima of the gap
 _STEPS_PER_PERIOD = 16
-# change of a landing step, relative to the flight and to the time in which the
-# acceleration would stop the approach, after which one more step is exact
+# if the landing time changes by less than this, relative to the flight time and to the
+# time in which the acceleration would stop the approach, the next step is the last one
 _LAST_CHANGE = 1e-3
-# maximum number of steps towards a landing or a lowest point; the last one is then used
+# maximum numbers of steps towards a landing and towards a lowest point; the last step
+# is then used
 _LANDINGS, _LOWERINGS = 100, 12
 
-# length of the first step, in units of speed / acceleration: slightly beyond the impact
+# length of the first step in units of speed / acceleration, slightly more than the 2 at
+# which a parabola would land
 _BEHIND = 2.2
 
 _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
 frozen = jax.lax.stop_gradient
-"""Step lengths and decisions carry no derivative."""
+"""Remove the derivative, because step lengths and decisions carry none."""
 
 
 class SearchState(NamedTuple):
@@ -51,10 +53,11 @@ class SearchState(NamedTuple):
     """Longest step."""
     mode: Int[Array, ""]
     low: Float[Array, ""]
-    """Step lengths before and beyond the point that is searched for."""
+    """Length of a step that ends before the point that is searched for."""
     high: Float[Array, ""]
+    """Length of a step that ends beyond that point."""
     tries: Int[Array, ""]
-    """Number of steps for the same purpose."""
+    """Number of steps taken so far for the same purpose."""
     rises: Bool[Array, ""]
     """Whether the flight has just passed its lowest point."""
 
@@ -96,8 +99,8 @@ def take_off(
 
 
 def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
-    """Return the longest step: within the horizon, and a fraction of the forcing
-    period.
+    """Return the longest step: a fraction of the forcing period, but not more than the
+    horizon.
     """
     if system.period is None:
         return jnp.asarray(horizon, jnp.float64)
@@ -108,12 +111,13 @@ def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
 def search_step(
     system: HybridSystem, f: SearchState
 ) -> tuple[SearchState, Bool[Array, ""]]:
-    """Take one step; return whether it ends just before an impact."""
+    """Take one step; also return whether it ends at an impact, before the rebound."""
 
     rates = flight_rates(system)
     end, wrong = runge_kutta_step(rates, f.time, f.y, f.length)
     rate = rates(f.time + f.length, end)
-    # zero, except for the derivative, because the landing moves with the motion
+    # zero at a landing, but its derivative is not, because the landing moves with the
+    # motion
     late = end[-1] / jnp.where(frozen(end[-2]) < 0, end[-2], -jnp.inf)
     lands = f.lands
     there = end - late * rate
@@ -140,7 +144,7 @@ def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
     good = ~searches | (size <= 1)
 
-    # landing, where a parabola through the end of the step lands
+    # to land, aim at the time at which a parabola through the end of the step lands
     enters = good & (gap < 0) & (searches | bottoms)
     landing = enters | (f.mode == _LAND)
     falls = (rise < 0) & (rise * rise > 2 * pull * gap)
@@ -155,8 +159,8 @@ def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""
     least = jnp.minimum(elapsed * jnp.abs(pull), jnp.abs(rise))
     close = landing & falls & (jnp.abs(change * pull) <= _LAST_CHANGE * least)
 
-    # the lowest point of a flight that may have passed below the surface within the
-    # step, between a time at which the gap decreases and one at which it increases
+    # if the flight may have passed below the surface within the step, seek its lowest
+    # point, between a time at which the gap decreases and one at which it increases
     dips = searches & good & ~f.rises & (fall < 0) & (rise > 0) & (gap > 0)
     share = fall / jnp.where(dips, fall - rise, 1.0)
     low = jnp.where(bottoms & ~enters & (rise < 0), f.length, jnp.where(dips, 0.0, low))

@@ -26,7 +26,7 @@ _ITERATIONS = 200
 
 
 class Line(eqx.Module):
-    """A one-parameter family of systems: all other data, and the index of the
+    """A one-parameter family of systems, stored as all other data and the index of the
     parameter.
 
     It is a pytree, so one compiled program is used for every choice of parameter.
@@ -142,14 +142,14 @@ def _rate(along: Line, moved: Line, value, periods: int):
 
 @program
 def _search(along: Line, low, high, periods: int) -> Interruption:
-    """Apply Newton's method with bisection if it leaves the bracket or does not
-    converge.
+    """Apply Newton's method, and bisection where it leaves the bracket or converges
+    slowly.
     """
 
     def look(carry):
         points, signs, value, step, ends, _, count, _ = carry
         margin, slope = _slope(along, value, periods)
-        # the two ends come first
+        # the first two evaluations are those at the ends
         at_end = jnp.arange(2) == count
         ends = jnp.where(at_end, margin, ends)
         signs = jnp.where(at_end, jnp.sign(margin), signs)

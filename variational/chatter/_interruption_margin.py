@@ -36,12 +36,13 @@ class _Sequence(NamedTuple):
     turn: Int[Array, ""]
     """Number of the period, from 1, whose end is the next release."""
     tau: Float[Array, ""]
-    """Time (relative to that release), speed, and number in its period of the impact
-    that defines the margin.
-    """
+    """Time of the impact that defines the margin, relative to that release."""
     speed: Float[Array, ""]
+    """Rebound speed of that impact."""
     rank: Int[Array, ""]
+    """Number of that impact in its period; -1 if there is none."""
     here: Int[Array, ""]
+    """Number of impacts in the period so far."""
 
 
 def interruption_margin(
@@ -55,23 +56,24 @@ def interruption_margin(
     needs only one run along the motion for any number of directions.
 
     **Arguments:** a system with two states, one constraint and a period, already
-    `prepared`; its release; `periods` from there to the last release. The function is
-    pure: it can be compiled, batched, and differentiated once in forward mode.
+    `prepared`; its release; the number of `periods` from this release to the last one.
+    The function is pure: it can be compiled, batched, and differentiated once in
+    forward mode.
 
     Returns:
         The margin; NaN if there is no impact in the last period, or if contact occurs
             earlier.
 
     Raises:
-        ValueError: It is differentiated twice.
+        ValueError: The function is differentiated twice.
     """
     return _margin(system, frame, periods=periods)
 
 
 @jax.custom_jvp
 def _last(slope):
-    """Return the slope, which has no derivative: impacts are correct to first
-    order.
+    """Return the slope, which must not be differentiated again: impacts are correct
+    only to first order.
     """
     return slope
 

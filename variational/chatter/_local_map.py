@@ -63,7 +63,7 @@ class LocalMap(eqx.Module):
         is not valid.
         """
         width = 1 - jnp.exp(self.M)
-        # sum of beta_k up to j - 1, solved for j
+        # the sum of beta_k up to k = j - 1 is solved for j
         share = (self.x_0 - x) / self.delta_x * width
         lobes = share < 1
         depth = jnp.log(jnp.where(lobes, 1 - share, 1.0)) / self.M

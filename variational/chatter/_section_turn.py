@@ -20,8 +20,8 @@ from ._scalar import check_chatter_system, scalar_gap
 
 
 _IMPACTS = 2000
-# the remaining impacts of a complete sequence then change the next period by less than
-# rounding
+# lambda / (1 - r) below which the remaining impacts of a complete sequence change the
+# next period by less than rounding
 _SMALL = 1e-12
 
 

@@ -30,7 +30,7 @@ def multipliers_at_grazing(
         return unknown
     _, sizes, right = np.linalg.svd(singular)
     growth = float(np.trace(singular))
-    # tolerance for growth that cancels
+    # c'b = 0, to within rounding
     if not abs(growth) > 1e-9 * sizes[0]:
         return unknown
     plane = right[1:].T

@@ -43,7 +43,7 @@ def close(
     period,
     scale: Float[ArrayLike, " n1"],
 ) -> Knots:
-    """Refine the impacts of an orbit without contact; unchanged if that fails.
+    """Refine the impacts of an orbit without contact; they are unchanged if that fails.
 
     `scale` is the size to which gaps and state components are relative. The states
     before impacts are those at the ends of the flights.
@@ -99,7 +99,7 @@ def _newton(system, rows, sides, real, following, period, scale):
         links, _, miss = linear(rows)
         matrix = matrix_of(links, following, real=real)
         if system.period is None:
-            # any time shift is a solution, so the smallest change is used
+            # any time shift yields another solution, so the smallest change is used
             step = jnp.linalg.lstsq(matrix, miss.ravel())[0]
         else:
             step = jnp.linalg.solve(matrix, miss.ravel())

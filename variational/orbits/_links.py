@@ -70,7 +70,8 @@ def landed(
     value = arrive(time, before)
     by_time, by_before = jax.jacfwd(arrive, argnums=(0, 1))(time, before)
     by_x = by_before @ by_state
-    # a later start at the same state is the same flight with an earlier state
+    # starting later from the same state is the same as starting at the original time
+    # from that state, carried back along the flow
     by_t = -by_x @ system.vector_field(start[0], start[1:])
     return Link(
         value,
@@ -190,7 +191,7 @@ def equations_and_monodromy(
     """Return the derivative of the equations with respect to unknowns and parameter,
     and the monodromy matrix.
 
-    For orbits with impacts; the system is `system_at(p)`.
+    The orbit must have impacts; the system is `system_at(p)`.
     """
     system = system_at(p)
     starts, ends = shooting.flights(u, system)
@@ -251,7 +252,7 @@ def return_map(shooting: AbstractShooting, u, system: HybridSystem, matrix):
     """Return the derivative of the return map to the first constraint, from the
     monodromy matrix.
 
-    It is in coordinates on the surface, with k = n - 1.
+    It refers to coordinates on the surface, and has the shape `(n - 1, n - 1)`.
     """
     starts, _ = shooting.segments(u, system)
     t, x = starts[0, 0], starts[0, 1:]

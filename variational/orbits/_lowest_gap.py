@@ -61,7 +61,7 @@ def lowest_times(
         node_t, node_x = times[k], states[k]
 
         def newton(_, found):
-            # the gap is that before the last change of the time, which is rounding
+            # the gap belongs to the time before its last change, which is only rounding
             s, _ = found
             x = flight_nodes(system, node_t, node_x, node_t + s, 1)[1][-1]
             v = normal_velocity(system, node_t + s, x)[which]

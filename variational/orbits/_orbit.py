@@ -225,7 +225,7 @@ def _check_closure(miss, closure, period) -> None:
 
 
 def _knots(system, impacts: Impacts, start: ImpactStart | None, t0, period, scale):
-    """Return the impacts as a boundary value problem, and the constraints hit."""
+    """Return the impacts, refined by shooting, and the constraints that are hit."""
     time, after = np.asarray(impacts.time), np.asarray(impacts.after)
     sides = np.asarray(impacts.constraint)
     if start is not None:

@@ -27,10 +27,11 @@ class TurnPieces(eqx.Module):
     before: Float[np.ndarray, "k n"]
     """State before the event, (k, n)."""
     contact: Bool[np.ndarray, "k m"]
-    """Constraints in contact during the piece and (`contact_after`) the next piece, (k,
-    m); only for constraints that are hit or touched.
+    """Constraints in contact during the piece, (k, m), where m includes the constraints
+    that are hit or touched.
     """
     contact_after: Bool[np.ndarray, "k m"]
+    """Constraints in contact during the next piece, (k, m)."""
 
 
 def cut_turn(
@@ -53,14 +54,14 @@ def cut_turn(
         end = float(contacts.end[k]) if bool(contacts.released[k]) else np.inf
         earlier = np.flatnonzero((time[:number] <= begin) & (which[:number] == side))
         if begin > t0 and len(earlier):
-            # contact counts from the last listed impact, because the others take no
-            # time
+            # contact counts from the last listed impact, because the remaining impacts
+            # take no time
             kind[earlier[-1]] = LAST_IMPACT
             begin = time[earlier[-1]]
         spans.append((begin, end, side))
     releases = [end for _, end, _ in spans if end < t1]
     own = [(time[i], kind[i], which[i], before[i]) for i in range(number)]
-    # an impact may end a contact: then it is a separate event
+    # a release at an impact is already listed as that impact
     let_go = [(end, NOTHING, 0, state) for end in releases if end not in time]
     events = sorted(own + let_go, key=lambda event: event[0])
     events.append((t1, NOTHING, 0, state))

@@ -1,4 +1,4 @@
-"""Shooting equations of orbits with a known sequence of impacts, exact or padded."""
+"""Shooting equations of orbits with a known impact sequence, padded or not."""
 
 import equinox as eqx
 import numpy as np
@@ -9,13 +9,13 @@ from ._shooting_equations import AbstractShooting
 
 
 class Shooting(AbstractShooting):
-    """The equations of a periodic orbit with a known sequence of impacts.
+    """The multiple-shooting equations of a periodic orbit with a known sequence of
+    impacts (thesis, eq. 3.42).
 
     The unknowns u are, for each impact, its phase (time in forcing periods) and the
     state after it: shape `(m (1 + n),)`. Without impacts, they are the state at time
     zero, shape `(n,)`. For a system without forcing, the first phase is zero, the
-    period (s) takes its place, and phases are in periods of the orbit (multiple
-    shooting; thesis, eq. 3.42).
+    period (s) takes its place, and phases are in periods of the orbit.
     """
 
     constraints: tuple[int, ...] = eqx.field(static=True)
@@ -56,8 +56,8 @@ class Shooting(AbstractShooting):
         """Return the same equations with this number of rows.
 
         Args:
-            rows: Number of rows, at least the number of impacts, which must not be
-                zero.
+            rows: Number of rows, at least the number of impacts. There must be at least
+                one impact.
             most_periods: Upper bound on the number of periods.
 
         Returns:

@@ -8,8 +8,8 @@ that is hit,
     x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
 
 closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. These equations contain no division by an
-impact speed, so they are as regular at grazing as elsewhere. Their solutions continue
-beyond it as motions through the constraint, which `seen` detects.
+impact speed, so they are as regular at grazing as elsewhere. Beyond grazing, their
+solutions continue as motions through the constraint, which `seen` detects.
 """
 
 import abc
@@ -92,7 +92,7 @@ class AbstractShooting(eqx.Module):
 
     @property
     def turns(self) -> Float[Array, ""]:
-        """Number of periods of the phases: of the forcing, or of the orbit."""
+        """Period of the orbit in the unit of the phases; 1 without forcing."""
         return jnp.asarray(self.periods if self.forced else 1, dtype=jnp.float64)
 
     @property
@@ -102,8 +102,8 @@ class AbstractShooting(eqx.Module):
 
     @property
     def following(self) -> Int[Array, " rows"]:
-        """Row of the next impact, for padding that after the first impact, shape
-        `(rows,)`.
+        """Row of the next impact, shape `(rows,)`; for a row of padding, the row after
+        the first.
         """
         k = jnp.where(self.real, jnp.arange(self.rows), 0)
         return jnp.where(k + 1 < self.number, k + 1, 0)
@@ -295,7 +295,7 @@ class AbstractShooting(eqx.Module):
         return gap_or_speed(system, starts, ends, number, hit, self.steps, count)
 
     def stroboscopic(self, u, system: HybridSystem, seen: Seen):
-        """Return the states at time zero and at each later forcing period.
+        """Return the states at time zero and at later multiples of the forcing period.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

@@ -47,14 +47,14 @@ class Choice:
     - `inclusion`, `deviation`: results of the bootstrap, by term and by parameter.
     - `doubtful`: terms that were dropped, with the fraction of the bootstrap samples
         that retain them; `needed`: those that are named nevertheless.
-    - `masked`: terms that were dropped, with their fractions of the explained cost,
-        because the smoothed corner of another term may leave as much unexplained.
+    - `masked`: terms that were dropped because the smoothed corner of another term may
+        leave as much unexplained, with their fractions of the explained cost.
     - `beyond`: rig parameters that are outside their tolerances.
     - `missing`: unnamed functions that explain more than named terms;
         `needs`: their bootstrap results, by label; `rivals`: other functions that were
         fitted in their place.
-    - `differing`: a parameter with separate values in the recordings, which explain
-        most of the residual of the chosen fit.
+    - `differing`: a parameter whose separate values in the recordings explain most of
+        the residual of the chosen fit.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -101,8 +101,8 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         with_all = _left(question, trials, found)
         if not any(one.significant for one in with_all):
             whole = held_out(trials, before, found)
-            # a term must improve held-out prediction; its threshold is not above that
-            # of a shape
+            # a term must improve held-out prediction; the second criterion is that of
+            # a shape
             if whole.after < whole.before or trials.foretells(best, found):
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
@@ -115,7 +115,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     settled = _settled(different, left, best.bic, trials.policy)
     without = None
     if left and best.names:
-        # the terms may only imitate the differences
+        # the named terms may only imitate differences between the recordings
         without = differing(before.fit, trials.policy)
         settled |= _settled(without, left_before, best.bic, trials.policy)
     if left and trials.policy.functions and not settled:
@@ -126,7 +126,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     separate = [one for one in options if _explains(one, best.bic)]
     fewest = min(separate, key=lambda one: one.bic, default=None)
     if fewest is not None and without is not None and _explains(without, best.bic):
-        # terms that hardly improve the separate values have only imitated them
+        # terms that hardly improve a fit with separate values only imitate these
         tied = without.bic < fewest.bic + trials.policy.tie
         fewest = without if tied else fewest
     if fewest is not None and left:
@@ -175,8 +175,9 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
 def _settled(
     different: Differing | None, left: list[Structure], bic: float, policy: Policy
 ) -> bool:
-    """Return whether separate values of a parameter leave only noise, have a smaller
-    BIC than the named terms, and no function common to the recordings promises as much.
+    """Return whether separate values of a parameter leave only noise and have a smaller
+    BIC than the named terms, while no function common to the recordings promises as
+    much.
     """
     if different is None or not _explains(different, bic):
         return False
@@ -221,9 +222,9 @@ def _without_a_name(
     """Return the functions that explain the residual of the named terms, chosen by
     their evidence.
 
-    A residual near the noise that is small compared with the part explained by a named
-    term does not count, nor one that the smoothing of dry friction may leave. A
-    function that the bootstrap samples do not retain is not needed.
+    Two kinds of residual do not count: one near the noise that is small compared with
+    the part explained by a named term, and one that the smoothing of dry friction may
+    leave. Functions that the bootstrap samples do not retain are dropped.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     problem = question.problem
@@ -258,7 +259,7 @@ def _without_a_name(
         )
         return search, *_needed(search, search.run(), best.bic, seed)
 
-    # elements with an internal state only if functions may not suffice
+    # elements with an internal state are tried only if functions may not suffice
     always = policy.elements > 1
     results = [searched(always)]
     first, found, _ = results[0]
@@ -266,7 +267,7 @@ def _without_a_name(
         results.append(searched(True))
         second, found, _ = results[-1]
         if first.need.preferred and second.falls_short(found):
-            # functions alone have not been sought
+            # the first search ended before it had tried functions alone
             results.append(searched(False, dataclasses.replace(policy, elements=0)))
     kept = [(one, its) for _, one, its in results if one is not None]
     if not kept:

@@ -20,7 +20,7 @@ class Differing(NamedTuple):
     - `values`, `stderr` `(r,)`: its value in each of the `records`.
     - `share`: share of the squared residual above the noise that the separate values
         explain; `left`: rms of the residual that remains, relative to the noise;
-        `complete`: whether that is noise.
+        `complete`: whether only noise remains.
     - `gained`: reduction of the cost; `fit`: the fit with separate values.
     """
 
@@ -37,7 +37,7 @@ class Differing(NamedTuple):
 
     @property
     def bic(self) -> float:
-        """Cost of the fit and of its additional numbers."""
+        """Cost of the fit plus the penalty for its additional values."""
         return self.fit.cost + (len(self.records) - 1) * math.log(
             self.fit.problem.samples
         )
@@ -65,8 +65,8 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
     The gain of separate values must be significant, and the values estimated from one
     half of each recording must improve the prediction of the other half.
 
-    **Returns:** `None` if nothing remains above the noise, if there is one recording
-    only, or if no separate values explain enough of it.
+    **Returns:** `None` if nothing remains above the noise, if there is only one
+    recording, or if no separate values explain enough of the residual.
     """
     problem, samples = found.problem, found.problem.samples
     shared = [n for n in found.free if not problem.parameter(n).per_record]
@@ -90,8 +90,8 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
 def _separated(found: Fit, name: str, policy: Policy, least: float) -> Differing:
     """Fit a parameter with a separate value for each recording.
 
-    **Arguments:** `least`: the share of the residual that they must explain; a fit that
-    is late in reaching it is stopped.
+    **Arguments:** `least`: the share of the residual that the separate values must
+    explain; a fit that does not reach this share soon enough is stopped.
     """
     problem = found.problem
     excess = found.cost - problem.samples

@@ -13,7 +13,7 @@ from ..policy import Policy
 from ..search import given_up, Trial, Trials, with_states
 
 
-# Seed of the distribution of sections: two diagnoses of a case agree
+# Seed that assigns sections to parts; fixed, so that two diagnoses of a case agree
 _SEED = 1
 
 

@@ -11,7 +11,7 @@ from ..search import newton_step, Trial, Trials
 class Limit(NamedTuple):
     """The smallest strength that would be named, its standard error and its unit.
 
-    `hidden` is the rig parameter that would absorb most of it.
+    `hidden` is the rig parameter that would absorb most of the effect.
     """
 
     size: float

@@ -4,13 +4,13 @@ from ..search import Trial, Trials
 
 
 def unmasked(trials: Trials, best: Trial) -> tuple[Trial, list[tuple[str, float]]]:
-    """Return a subset without the terms that the error of a smoothed corner also
-    explains.
+    """Return a subset without the terms that may only represent the error of a smoothed
+    corner.
 
     Dry friction jumps when the velocity changes sign. The jump is smoothed, and
-    integration steps do not end there, so a small fraction of the explained cost may
-    remain. With many samples this fraction is significant, and another term may
-    represent it.
+    integration steps do not end there, so the term may leave a small fraction of the
+    cost that it should explain. With many samples this fraction is significant, and
+    another term may represent it.
 
     **Returns:** the fit, and the dropped terms, each with its fraction of the explained
     cost.

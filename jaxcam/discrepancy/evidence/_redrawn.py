@@ -40,8 +40,8 @@ def sure(
 
 
 def _size(trials: Trials, best: Trial, name: str, deviation) -> float:
-    """Return the squared strengths of a term in units of their standard errors, summed
-    and divided by the critical value; below one, they may be zero.
+    """Return the sum of the squared strengths of a term, in units of their standard
+    errors, divided by the critical value; if below one, the strengths may be zero.
     """
     own = [one.name for one in trials.term(name).strengths() if not one.inner]
     found = [best.fit[one] for one in own]
@@ -56,7 +56,8 @@ class Needs(NamedTuple):
 
     - `inclusion`: fraction of the bootstrap samples that would retain a part.
     - `deviation`: standard deviation of each free parameter over the bootstrap samples.
-    - `lost`: loss in all data without a part, minus the penalty for its parameters.
+    - `lost`: increase in the cost of all data if a part is removed, minus the penalty
+      for its parameters.
     """
 
     inclusion: dict[str, float]
@@ -144,8 +145,8 @@ def _inside(found: Fit) -> list[str]:
 
 
 def _lost(information, score, value, free, gone, top: float) -> float:
-    """Return the loss when some strengths are zero and all other parameters are
-    refitted.
+    """Return the increase in the cost when some strengths are zero and all other
+    parameters are refitted.
     """
     step = np.zeros(len(value))
     step[gone] = -value[gone]

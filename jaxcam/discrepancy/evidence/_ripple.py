@@ -1,10 +1,10 @@
 """Detect ripple of the drive speed in its encoder signal.
 
-`w (1 + eps cos(phi - psi))` shifts the angle by `eps sin(phi - psi)` to first order. A
-real drive also drifts slowly: variations slower than three quarters of its rotation
-frequency are fitted freely (by cosines over the length of the recording) and are not
-ripple. The leakage of the drift into the harmonic is estimated from the spectrum at
-non-harmonic multiples of the rotation frequency.
+To first order, a speed `w (1 + eps cos(phi - psi))` shifts the angle by
+`eps sin(phi - psi)`. A real drive also drifts slowly: variations slower than three
+quarters of its rotation frequency are fitted freely (by cosines over the length of the
+recording) and do not count as ripple. The leakage of the drift into the harmonic is
+estimated from the spectrum at non-harmonic multiples of the rotation frequency.
 """
 
 import dataclasses

@@ -44,7 +44,7 @@ def rivals(
             kept.append(one)
     kept = kept[: policy.alternatives]
     costs = [_costs(one.fit, policy) for one in (found, *kept)]
-    # joints, priors and the price of parameters are not drawn again
+    # joints, priors and penalties for parameters are not resampled
     prices = np.array(
         [one.score - cost.sum() for one, cost in zip((found, *kept), costs)]
     )

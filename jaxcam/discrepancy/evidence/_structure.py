@@ -1,5 +1,5 @@
-"""Analyse the residuals of a fit: shapes with a significant gain, and their
-location.
+"""Analyse the residuals of a fit: find shapes with a significant gain, and where they
+occur.
 """
 
 import dataclasses
@@ -80,9 +80,9 @@ class Structure:
     """Standard errors of `value`."""
 
     predicted_gain: float = math.inf
-    """Increase in the log-likelihood of one half of the recordings with the estimate
-    from the other half, if `gain` is above its threshold. It is negative for an effect
-    that differs from recording to recording.
+    """If `gain` exceeds its threshold, the gain in the log-likelihood of one half of
+    the recordings when the effect is estimated from the other half. It is negative for
+    an effect that differs from recording to recording.
     """
     form: Form = Form.FUNCTION
     """An unlisted term, a free function, a vibration, or residuals that are correlated
@@ -122,7 +122,7 @@ def structures(
 
     **Arguments:** the fit, the response to a force about it, terms that only describe
     an unknown effect, the periodogram of the residuals, whether there is a drive, the
-    constants of forms, the unit of the motion, and the policy.
+    constants of the shapes, the unit of the motion, and the policy.
     """
     problem, seen = found.problem, visited_states(found.problem)
     more: tuple[Term, ...] = (
@@ -169,7 +169,7 @@ def structures(
                 )
             )
     made += [_vibration(scan, problem, tests, policy), _coloured(found, tests, policy)]
-    # a fitted shape contains more than its gain
+    # shapes come before coloured residuals, which say nothing about the cause
     return sorted(
         made,
         key=lambda one: (
@@ -190,7 +190,7 @@ def _shape(
     seen: VisitedStates,
     policy: Policy,
 ) -> dict[str, Any]:
-    """Return a fitted shape as a function."""
+    """Return the fields of a `Structure` that tabulate a fitted shape."""
     if not isinstance(term, Shape):
         return {}
     both = np.union1d(free, own)
@@ -208,7 +208,7 @@ def _threshold(
 ) -> float:
     chance = policy.false_alarms / tests / looks
     least = max(count * math.log(samples), float(chi2.isf(chance, count)))
-    # as certain as a named term
+    # a structure must be as certain as a named term
     return (math.sqrt(least) + policy.beyond) ** 2
 
 

@@ -21,7 +21,7 @@ class VisitedStates(NamedTuple):
     """Values of each variable in the recordings, and their duration (s).
 
     Positions are those of the state: offset and gain of the sensor are removed.
-    `strides` are the changes of each variable in an integration step where it is fast.
+    `strides` are the changes of each variable in one integration step of fast motion.
     """
 
     position: Float[np.ndarray, " _"]
@@ -93,7 +93,7 @@ def visited_states(problem: Problem) -> VisitedStates:
 
 
 def _strides(problem: Problem, exists, velocity, push: float):
-    """Return the changes of each variable in an integration step.
+    """Return the changes of each variable in one integration step of fast motion.
 
     **Arguments:** velocities, and a large acceleration.
     """

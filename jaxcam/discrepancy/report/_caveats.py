@@ -83,7 +83,7 @@ def caveats_of(
 
 
 def differs(found: Differing, policy: Policy) -> Caveat:
-    """Caveat: a parameter differs from recording to recording."""
+    """Return the caveat that a parameter differs from recording to recording."""
     values, unit = found.values, found.unit
     if len(values) <= policy.several:
         said = ", ".join(
@@ -115,7 +115,7 @@ def noisier_than_stated(question: Question) -> Iterator[Caveat]:
 
 
 def above_noise(held: HeldOut, named: bool) -> Caveat:
-    """Caveat: held-out data are not predicted to within the noise; possible reasons."""
+    """Return the caveat that held-out data are not predicted to within the noise."""
     if named and held.after > held.before:
         return poor_prediction(held)
     return Caveat(
@@ -127,8 +127,8 @@ def above_noise(held: HeldOut, named: bool) -> Caveat:
 
 
 def poor_prediction(held: HeldOut) -> Caveat:
-    """Caveat: some recordings do not determine the parameters needed to predict the
-    others.
+    """Return the caveat that part of the data does not determine the parameters needed
+    to predict the rest.
     """
     return Caveat(
         Reason.POOR_PREDICTION,
@@ -139,7 +139,7 @@ def poor_prediction(held: HeldOut) -> Caveat:
 
 
 def small_remainder(choice: Choice, share: float) -> Caveat:
-    """Caveat: a named effect leaves a small residual."""
+    """Return the caveat that a named effect leaves a small residual."""
     first = choice.unexplained[0]
     return Caveat(
         Reason.SMALL_REMAINDER,
@@ -151,7 +151,7 @@ def small_remainder(choice: Choice, share: float) -> Caveat:
 
 
 def functions_fall_short(left: float) -> Caveat:
-    """Caveat: unnamed functions do not explain the recordings down to the noise."""
+    """Return the caveat that unnamed functions leave a residual above the noise."""
     return Caveat(
         Reason.FAR_FROM_DATA,
         f"With these functions, the residual of the fit is still {ratio(left)} times "
@@ -161,7 +161,7 @@ def functions_fall_short(left: float) -> Caveat:
 
 
 def functions_tie(name: str, rival: Rival) -> Caveat:
-    """Caveat: another function, or another form, explains about as much."""
+    """Return the caveat that another function or form explains about as much."""
     return Caveat(
         Reason.TIE,
         f"These recordings do not distinguish the function from {name}, which would "
@@ -172,7 +172,7 @@ def functions_tie(name: str, rival: Rival) -> Caveat:
 
 
 def decoy_explains(share: float) -> Caveat:
-    """Caveat: a function that acts at the wrong times explains much as well."""
+    """Return the caveat that a decoy acting at the wrong times also explains much."""
     return Caveat(
         Reason.DECOY,
         "Evaluated along the time-reversed motion, the function would explain "
@@ -191,7 +191,7 @@ def _in_doubt(trials: Trials, name: str, share: float) -> Caveat:
 
 
 def _beyond(outside: Outside) -> Caveat:
-    """Caveat: a parameter is outside its tolerance, or a term was named instead."""
+    """Return the caveat on a parameter beyond its tolerance or a term in its place."""
     one, name = outside.parameter, outside.term
     label = spelled(one.name)
     said = number(one.value, one.stderr, one.unit)
@@ -243,7 +243,7 @@ def _against(trials: Trials, share: float) -> str:
 
 
 def _far(trials: Trials) -> Caveat:
-    """Caveat: no fit comes near the data; state the distance of the best one."""
+    """Return the caveat that even the best fit is far from the data."""
     least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
     named = listed(sorted(least.names)) if least.names else "none of them"
     return Caveat(

@@ -1,4 +1,4 @@
-"""Find parametric forms that almost represent a function which has none."""
+"""Find parametric forms that are close to functions which no form represents."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,10 +27,11 @@ def close_forms(
     explained: Mapping[str, float],
     small: float,
 ) -> dict[str, CloseForm]:
-    """Return, by their slots, the best forms of functions that have none.
+    """Return the closest forms of functions that no form represents, by slot.
 
     **Arguments:** the functions found; other fits, the best first; the cost that each
-    function explains, by its label; and the fraction of it that a form may leave.
+    function explains, by its label; and the fraction of this cost that a form may leave
+    unexplained.
     """
     found: dict[str, CloseForm] = {}
     for other in others:
@@ -45,8 +46,8 @@ def close_forms(
 
 
 def _only_form(missing: Missing, other: Missing) -> tuple[Free | None, Free | None]:
-    """Return the only function that differs in another fit, by a form that it has
-    there.
+    """Return the only function in which another fit differs, and its form there; `None`
+    twice if the fits differ in any other way.
     """
     nothing = None, None
     if other.names != missing.names or len(other.functions) != len(missing.functions):

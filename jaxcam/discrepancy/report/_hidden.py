@@ -77,7 +77,7 @@ def _curve(element, along):
 
 
 def hidden_unit(element: HiddenElement, unit: str) -> str:
-    """Return the unit of the table, given that of the coordinate."""
+    """Return the unit of the tabulated values, given that of the coordinate."""
     return f"{unit}/s^2" if isinstance(element, Hysteresis) else "1/s^2"
 
 
@@ -93,7 +93,7 @@ def hidden_formula(element: HiddenElement) -> str:
         state = f"z' = velocity - z/{_n(e.time)}"
     else:
         assert isinstance(e, Hysteresis)
-        # from the rounded number, so that both add up to one
+        # 1 - b follows from the rounded b, so that the printed numbers add up to one
         b = f"{float(e.beta):.4g}"
         sign = "-" if e.loading > 0 else "+"
         state = (

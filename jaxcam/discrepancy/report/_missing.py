@@ -35,7 +35,7 @@ _KINDS = {
     Where.CONTACT: "surface",
     Where.SENSOR: "sensor",
 }
-# Points that represent a graph, for each one that is kept
+# Points at which a function is evaluated, for each point that is kept
 _FINER = 20
 _VERBS = {
     "force": "a force",
@@ -116,8 +116,8 @@ def missing_functions(
     """Return the functions found, each with its errors.
 
     **Arguments:** the functions found, the ranges of the motion (for the tables of
-    functions of two arguments), the number of points of each grid, and the forms that
-    are close to functions, by their slots.
+    functions of two arguments), the number of points of each grid, and the closest
+    parametric forms, by the slots of the functions.
     """
     return tuple(
         _hidden(missing.fit, one, points)
@@ -218,10 +218,10 @@ def _gap_name(found: Fit, family: Family) -> str:
 
 
 def _graded(even: np.ndarray, function) -> np.ndarray:
-    """Return as many points, between which a function is almost linear.
+    """Return the same number of points, between which a function is almost linear.
 
-    They are equidistant along its graph in units of its ranges, so that a step has
-    several.
+    The points are equidistant along the graph of the function, with both axes scaled
+    to their ranges, so that several points lie on a step.
     """
     points = len(even)
     fine = np.linspace(even[0], even[-1], _FINER * points)

@@ -184,8 +184,8 @@ def _of_functions(
 
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
-    """Return caveats if the functions do not explain all data or the held-out data, or
-    if other functions explain as much.
+    """Return caveats if the functions leave a residual, do not predict the held-out
+    data, or explain no more than others do.
     """
     left, held = rms_of(missing.fit), choice.held
     for rival in choice.rivals:

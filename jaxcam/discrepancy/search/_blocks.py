@@ -44,8 +44,8 @@ class Blocks:
         return np.array([k for k, n in enumerate(self.names) if n in wanted], dtype=int)
 
     def total(self, weight=None):
-        """Return weighted information and score of all blocks, including the
-        tolerances.
+        """Return the weighted sums of information and score over all blocks, including
+        the contributions of the tolerances.
         """
         weight = np.ones(len(self.record)) if weight is None else weight
         information = np.einsum("b,bij->ij", weight, self.information)
@@ -104,7 +104,7 @@ def blocks_of(
 
 
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
-    """Return the parameter values of some blocks at a fit, in their scales."""
+    """Return the parameter values of blocks at a fit, in units of their scales."""
     all_names = found.problem.names
     columns = [all_names.index(name) for name in blocks.names]
     return np.asarray(found.point.values)[blocks.owner, columns] / blocks.scale

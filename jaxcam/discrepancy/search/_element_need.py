@@ -24,7 +24,7 @@ class ElementNeed:
         self.fits, self.driven, self.policy = fits, driven, policy
         # whether an element is predicted to gain more than any function or term
         self.preferred = False
-        # whether it is predicted to gain at least `promising` times as much
+        # whether its predicted gain exceeds `promising` times the best of those
         self.comparable = False
 
     def compare(
@@ -32,8 +32,8 @@ class ElementNeed:
     ) -> None:
         """Compare an element with the first functions and terms.
 
-        **Arguments:** a fit without functions, their predicted gains in addition to it,
-        and the required gain.
+        **Arguments:** a fit without functions; the predicted gains of adding single
+        functions and terms to this fit; and the required gain.
         """
         promised, best = self._promised(problem, bare), max(gains, default=0.0)
         self.preferred = promised > max(least, best)
@@ -42,8 +42,8 @@ class ElementNeed:
     def remains(self, problem: Problem, found: Missing | None, least: float) -> bool:
         """Return whether an element may explain what functions leave.
 
-        **Arguments:** a fit with functions that leaves a residual, and the required
-        gain in addition to it.
+        **Arguments:** a fit with functions that leaves a residual, and the gain that an
+        element must add to it.
         """
         if self.comparable or found is None:
             return self.comparable

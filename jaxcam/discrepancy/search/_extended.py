@@ -72,10 +72,10 @@ def extended(
 
 
 def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) -> Fit:
-    """Return the parameters of a fit with states fitted to other data, for a test.
+    """Return the fit with its states refitted to other data, for a test.
 
-    The programs of the fit itself are reused: all parameters are free, with a scale of
-    zero.
+    The parameters keep their values. They are formally free, with a scale of zero, so
+    that the compiled programs of the fit are reused.
     """
     local = jnp.asarray(free_columns(problem, found.free).local)
     scales, none = jnp.zeros(local.shape), jnp.zeros(local.shape)
@@ -92,7 +92,7 @@ def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) 
 
     states = np.asarray(found.point.states)
     each, costs, steps = about(jnp.asarray(states))
-    # for each recording separately: a step that worsened its fit is shortened
+    # each recording has its own step length, shortened if the fit became worse
     share = np.ones(len(states))
     for _ in range(policy.state_iterations):
         moved = states + share[:, None, None] * np.nan_to_num(steps)

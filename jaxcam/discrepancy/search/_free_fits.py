@@ -25,14 +25,15 @@ _SETTLED = 0.02
 
 
 class Missing(NamedTuple):
-    """The result: `functions` and `names` of terms, fitted together with the rig.
+    """A fit of the rig with free `functions` and with the terms that `names` lists.
 
     - `score`: minus twice the logarithm of the evidence (the BIC if there is no
         function).
     - `problem`: the problem with slots for the functions; that of `fit` contains their
       priors.
-    - `decoys`: by label, the gain that was predicted for a function of the same family
-      acting in the reverse order of time, as a fraction of that of the function.
+    - `decoys`: for each label, the predicted gain of a function of the same family that
+      acts in the reverse order of time, as a fraction of the gain of the function
+      itself.
     """
 
     functions: tuple[Part, ...]
@@ -85,7 +86,7 @@ class FreeFits:
     ) -> Missing:
         """Fit a subset, including the smoothness of its functions.
 
-        A fit that is late in falling below the cost `beaten` is stopped.
+        A fit that does not fall below the cost `beaten` soon enough is stopped.
         """
         policy, functions = self.policy, subset.functions
         heat, point, found = 1.0, start, None
@@ -123,8 +124,8 @@ class FreeFits:
     def _stop(
         self, samples: int, heat: float, beaten: float
     ) -> Callable[[Sequence[float]], bool]:
-        """Return a function that stops a fit if it has failed or its steps no longer
-        affect a choice.
+        """Return a function that stops a fit if it has failed, or if its last steps
+        gained too little to affect a choice.
         """
         gives_up = given_up(samples, self.policy, beaten)
 
@@ -172,10 +173,10 @@ class FreeFits:
         return tuple(found)
 
     def needed_parts(self, found: Missing, one: Hidden) -> tuple[int, ...]:
-        """Return the direct parts of an element's force that justify a parameter.
+        """Return the direct parts of an element's force that justify their parameters.
 
-        The others are removed one by one, the least significant first, according to the
-        quadratic likelihood about the fit.
+        The other parts are removed one by one, the least significant first, according
+        to the quadratic likelihood about the fit.
         """
         heat = heat_of(found.fit)
         problem = heated(filled(found.problem, found.functions), heat)
@@ -280,7 +281,7 @@ def heat_of(found: Fit) -> float:
 
 
 def heated(problem: Problem, heat: float) -> Problem:
-    """Return the problem with its priors scaled like the weight of the data."""
+    """Return the problem with the weight of its priors multiplied by `heat`."""
     return dataclasses.replace(
         problem,
         parameters=tuple(
@@ -321,8 +322,8 @@ def _as_before(fresh, one) -> bool:
 
 
 def _recentred(problem: Problem, fresh, functions, point: Point) -> Point:
-    """Return the point for functions whose hidden elements are linearised about other
-    parameters.
+    """Return the point with the parameters of hidden elements reset for their new
+    points of linearisation.
     """
     for one, before in zip(fresh, functions):
         if one is not before and isinstance(one, Hidden):

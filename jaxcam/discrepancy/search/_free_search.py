@@ -79,7 +79,7 @@ class FreeSearch:
     def run(self) -> Missing | None:
         """Return the functions and terms found, or `None` if none is significant.
 
-        The search ends as soon as an element is preferred that is not a candidate.
+        The search ends as soon as it prefers an element that is not a candidate.
         """
         bare = self._bare(self.apart, self.problem.start)
         found = self._grown(bare, True)
@@ -105,11 +105,11 @@ class FreeSearch:
             and leaves_noise(self.fits, whole)
             and not leaves_noise(self.fits, found)
         ):
-            # no form replaces the function that was left out
+            # the form does not make up for the function that was left out
             curve, found = whole, self._formulated(whole)
         if len(found.functions) > 1 or found.names:
             return found
-        # a form may be a little worse than its curve: the better of both counts
+        # a form may score a little worse than its curve: the better score counts
         best = min(curve.score, found.score)
         for lead in self._others():
             if leaves_noise(self.fits, found, self._small(found)):
@@ -144,7 +144,8 @@ class FreeSearch:
     def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
         """Return the fit with another function alone, or `None` if it fails.
 
-        On individual pieces of flight, a smooth function may be ahead of the right one.
+        On single pieces of flight, a smooth function may score better than the right
+        one.
         """
         self.progress(f"fitting {lead.label} instead", None)
         return self._with(self.problem, bare, lead)
@@ -152,8 +153,8 @@ class FreeSearch:
     def lacks_element(self, found: Missing | None) -> bool:
         """Return whether to repeat the search with elements among the candidates.
 
-        This is the case if one is preferred to every function, or if the functions
-        leave a residual that one may explain.
+        This is so if an element is preferred to every function, or if it may explain
+        a residual that the functions leave.
         """
         if self.need.preferred or not self.falls_short(found):
             return self.need.preferred
@@ -227,7 +228,7 @@ class FreeSearch:
         return leaves_noise(self.fits, best) and not close
 
     def _small(self, found: Missing) -> float:
-        """Return the tolerated residual gain, given the explained one."""
+        """Return the gain that may remain, given the gain explained so far."""
         return self.policy.small * max(self.cost - found.fit.cost, 0.0)
 
     def _least(self) -> float:
@@ -278,7 +279,7 @@ class FreeSearch:
     def _swapped(self, found: Missing) -> Missing:
         """Replace earlier functions by terms that explain more.
 
-        Far from the data, a function may represent two effects.
+        A function found far from the data may represent two effects.
         """
         for out in (*found.functions, *sorted(found.names)):
             rest, point = self._without(found, out)

@@ -21,9 +21,9 @@ def added_gain(information, score, free, new, alike: float) -> float:
     """Return the increase in twice the log-likelihood when `new` are freed in addition
     to `free`.
 
-    If the free parameters represent a combination so well that less than a fraction
-    `alike` of its information remains, its gain is zero, because only rounding errors
-    would be left.
+    If the free parameters represent a combination of the new ones so well that less
+    than a fraction `alike` of the information on it remains, the gain of this
+    combination is zero, because only rounding errors would be left.
     """
     new = np.setdiff1d(new, free)
     if not len(new):

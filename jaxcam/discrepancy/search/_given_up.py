@@ -23,8 +23,8 @@ def given_up(
     very little.
 
     **Arguments:** the number of samples; the policy; the cost that a fit must fall
-    below; and the cost below which a crawling fit is not stopped, because its value
-    affects a decision.
+    below; and the cost below which a crawling fit is not stopped, because its final
+    cost affects a decision.
     """
 
     def stop(costs: Sequence[float]) -> bool:

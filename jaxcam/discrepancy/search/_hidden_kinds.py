@@ -22,7 +22,7 @@ class Number:
     """A parameter of an element: its name, its bounds, and its largest change in one
     fit.
 
-    If `logarithm` is true, its logarithm is fitted.
+    If `logarithm` is true, the logarithm of the parameter is fitted.
     """
 
     name: str
@@ -57,8 +57,8 @@ class Number:
 class Kind:
     """A kind of element.
 
-    - `name`: its name in sentences; `element`: makes one from its parameters;
-      `numbers`: its parameters; `outputs`: names of its strengths.
+    - `name`: its name in sentences; `element`: the function that creates an element
+      from its parameters; `numbers`: its parameters; `outputs`: names of its strengths.
     - `signals(driven, cells)`: returns, for each set of parameters, the outputs `(r, n,
       o)` and free motions `(r, n, s)`.
     """
@@ -73,8 +73,8 @@ class Kind:
     ]
 
     def reach(self, number: Number, values: Sequence[float]) -> float:
-        """Return the largest change of a parameter in one fit: a fraction of the width
-        of a resonance.
+        """Return the largest change of a parameter in one fit; for the frequency of a
+        resonance, this is a fraction of the width of the resonance.
         """
         if self is RESONANCE and number.name == "frequency":
             return number.reach * values[1]

@@ -26,7 +26,7 @@ from ._vibration_scan import scanned_frequencies
 
 
 # Damping ratios of the grid; the spacing of the frequencies is proportional to the
-# width of a resonance wide
+# width of a resonance
 _RATIOS = (0.02, 0.1)
 # Ratio of adjacent time constants of a relaxation
 _TIMES = 1.25
@@ -37,7 +37,7 @@ _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
 # The same for a stiffening hysteresis
 _STIFFENING_LIMITS = tuple(np.geomspace(0.1, 10, 12).tolist())
 _STIFFENING_SHAPES = ((-0.3, 1.0), (-2.0, 1.0), (-0.3, 2.0), (-2.0, 2.0))
-# Number of force values at nodes that are computed at once
+# Maximum number of force values at nodes that are computed at once
 _AT_ONCE = 8_000_000
 # Relative increase of a diagonal that keeps a matrix positive definite
 _FORCES = 1e-9
@@ -58,7 +58,7 @@ class Promise(NamedTuple):
 def promises(
     problem: Problem, response: Response, driven: Driven, policy: Policy
 ) -> Iterator[Promise]:
-    """Return the best cell of each kind of element.
+    """Yield the best grid cell of each kind of element.
 
     **Arguments:** a problem with a slot for an element, and its `Response` about a fit.
     """
@@ -100,7 +100,8 @@ def _grids(problem: Problem, driven: Driven, policy: Policy):
                 for f in np.exp(np.arange(math.log(low), math.log(high), ratio))
             ],
         )
-        # the same range distinguishes a relaxation from damping and from stiffness
+        # with a corner frequency outside this range, a relaxation would act like
+        # damping or stiffness
         longest = 1 / (2 * math.pi * low)
         shortest = 1 / (2 * math.pi * high)
         count = max(2, math.ceil(math.log(longest / shortest) / math.log(_TIMES)))
@@ -205,8 +206,9 @@ class _Sums:
     """Information and score of the parameters and of the forces in cells, for one
     recording.
 
-    `pp`, `p` of the parameters; `pf` `(m, cells, p)` couples them to the forces; `f`
-    `(cells, p)` is their score and `ff` `(cells, p, p)` their information.
+    `pp` and `p` are information and score of the parameters; `pf` `(m, cells, p)`
+    couples the parameters to the forces; `f` `(cells, p)` and `ff` `(cells, p, p)` are
+    score and information of the forces.
     """
 
     def __init__(self, m: int, cells: int, width: int):

@@ -26,7 +26,7 @@ class Driven:
     `position` `(r, n)`, the last value repeated if a recording is shorter than others;
     `begin`, `interval` `(r,)`; `spread`: largest distance of the positions from their
     `middle`;
-    `motion_unit`: of the position.
+    `motion_unit`: unit of the position.
     """
 
     position: Float[np.ndarray, "r n"]
@@ -38,8 +38,7 @@ class Driven:
 
 
 def driven_by(problem: Problem, motion_unit: str = "") -> Driven | None:
-    """Return the measured position of the first coordinate, smoothed in each flight.
-
+    """Return the measured position of the first coordinate, smoothed in each flight, or
     `None` if no sensor measures it.
     """
     place = problem.model.system.coordinates[0][0]  # pyright: ignore
@@ -83,7 +82,7 @@ def _smooth(part, channel: str) -> Float[np.ndarray, " n"]:
 
 
 def resonance_signals(driven: Driven, frequency: float, ratio: float):
-    """Outputs z and z' of `z'' + 2 D w z' + w^2 z = q`, and its free motions.
+    """Return the outputs z, z' of `z'' + 2 D w z' + w^2 z = q`, and its free motions.
 
     The result is exact for a position that is linear between samples; the element
     starts at rest.
@@ -96,7 +95,7 @@ def resonance_signals(driven: Driven, frequency: float, ratio: float):
     filtered, free = [], []
     for position, interval in zip(driven.position, driven.interval):
         y = _first_order(position, pole, interval)
-        # the imaginary part of y is z, of its rate z'
+        # up to a factor, the imaginary part of y is z, and that of its rate is z'
         filtered.append(np.stack([y.imag, (pole * y).imag], axis=-1) / (w * root))
         wave = np.exp(pole * interval * np.arange(len(position)))
         free.append(np.stack([wave.real, wave.imag], axis=-1))
@@ -104,7 +103,7 @@ def resonance_signals(driven: Driven, frequency: float, ratio: float):
 
 
 def relaxation_signals(driven: Driven, time: float):
-    """Output of `z' = v - z / time`, and its free motion, both `(r, n, 1)`."""
+    """Return output and free motion of `z' = v - z / time`, both `(r, n, 1)`."""
     pole = complex(-1 / time)
     filtered, free = [], []
     for position, interval in zip(driven.position, driven.interval):
@@ -129,19 +128,18 @@ def _first_order(position, pole: complex, interval: float):
 
 # Initial state of a hysteresis, used to compute the effect of a change in it
 _BESIDE = 1e-3
-# Largest state of a stiffening hysteresis, in units of its scale: it may grow without
-# bound in a finite deflection
+# Limit on the state of a stiffening hysteresis, in units of its scale: without a limit,
+# the state may become infinite at a finite deflection
 _MOST = 30.0
 
 
 def hysteresis_signals(
     driven: Driven, limits: Any, betas: Any, powers: Any, loading: int = 1
 ) -> tuple[Float[np.ndarray, "k r n 1"], Float[np.ndarray, "k r n 1"]]:
-    """Compute the hysteresis of Bouc and Wen for several `(k,)` sets of parameters at
-    once.
+    """Compute Bouc-Wen hysteresis for several `(k,)` sets of parameters at once.
 
-    **Returns:** its state, starting from zero, and the derivative with respect to the
-    initial state.
+    **Returns:** the internal state, starting from zero, and its derivative with respect
+    to the initial state.
     """
     limits, betas, powers = (
         np.asarray(x, dtype=float)[:, None] for x in (limits, betas, powers)

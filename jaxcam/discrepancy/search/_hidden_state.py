@@ -51,7 +51,7 @@ class Hidden:
     cells: int = 1
     slot: str = HiddenForce.label
 
-    # it has no smoothness parameter
+    # an element has no smoothness prior
     smooth: ClassVar[bool] = False
 
     @property
@@ -64,12 +64,12 @@ class Hidden:
 
     @property
     def outputs(self) -> list[str]:
-        """Return the names of the parameters that are strengths of its outputs."""
+        """Return the names of the fitted strengths of the element's outputs."""
         return [f"{self.slot}_shared_{k}" for k in range(len(self.kind.outputs))]
 
     @property
     def changes(self) -> list[str]:
-        """Return the names of the parameters that are changes of its parameters."""
+        """Return the names of the fitted changes of the element's parameters."""
         first = len(self.kind.outputs)
         return [
             f"{self.slot}_shared_{first + k}" for k in range(len(self.kind.numbers))
@@ -101,7 +101,7 @@ class Hidden:
 
     def moved_from(self, other: "Hidden") -> float:
         """Return the distance of its parameters from those of another element, in units
-        of their largest changes.
+        of the largest changes allowed in one fit.
         """
         return max(
             abs(number.change(a, b)) / self.kind.reach(number, other.numbers)

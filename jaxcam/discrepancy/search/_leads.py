@@ -22,7 +22,7 @@ from ._slots import filled, Free, free_term, slots_of
 
 
 class Lead(NamedTuple):
-    """One more function or term, with its predicted gain.
+    """A candidate function, element or term, with its predicted gain.
 
     `decoy` is the gain of a function of the same family that acts in the reverse order
     of time, as a fraction of the gain; `None` if it was not computed.
@@ -140,7 +140,7 @@ class Leads:
     ) -> Lead:
         family = lead.family
         assert family is not None
-        # under time reversal, a function of time or of the phase alone remains one
+        # reversed in time, a function of time or phase alone is still such a function
         alone = family.factor is Factor.ONE
         clock = family.argument in (Variable.TIME, Variable.PHASE)
         if (alone and clock) or not lead.gain > 0:
@@ -188,7 +188,7 @@ class Leads:
 
 
 def decoys_of(leads: Sequence[Lead], found: Missing) -> tuple[tuple[str, float], ...]:
-    """Return the labels of functions, and the fractions that their decoys gain."""
+    """Return labels of functions, and the gains of their decoys as fractions."""
     labels = {one.label for one in found.functions}
     return tuple(
         (lead.label, lead.decoy)
@@ -198,6 +198,6 @@ def decoys_of(leads: Sequence[Lead], found: Missing) -> tuple[tuple[str, float],
 
 
 def shows_apart(family: Family) -> bool:
-    """Return whether disconnected pieces show a function."""
+    """Return whether disconnected pieces contain information on a function."""
     drifts = family.where is Where.SENSOR and family.argument is Variable.TIME
     return family.where is not Where.IMPACT and not drifts

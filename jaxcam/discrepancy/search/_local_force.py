@@ -63,7 +63,7 @@ class Response(NamedTuple):
         for the parameters and `l` for the force at the nodes.
     - `place` `(r, m)`: index among the `g` free parameters of each parameter of a
       recording.
-    - `time` `(r, k, l)`: times of the nodes. `exists` `(r, k)`.
+    - `time` `(r, k, l)`: times of the nodes. `exists` `(r, k)`: false where padded.
     - `names`, `scale`, `prior`, `pull`, `owner` `(g,)`: names and scales of the free
         parameters, the contributions of their tolerances to information and score, and
         the recording to which they belong.
@@ -238,7 +238,7 @@ def _linear(
     near, pieces, extras, states, columns, scales, nodes, stride, shown
 ) -> LinearPieces:
     arrays, others = zip(*(eqx.partition(one, eqx.is_array) for one in near))
-    # one number for all recordings, so that its loops have one condition
+    # the same number for all recordings, so that their loops can be run as one
     substeps = jnp.max(pieces.substeps)
 
     def record(arrays, pieces, extras, states, columns, scales):

@@ -26,7 +26,7 @@ def motion_scales(
     fast = fast_speed(runs, channel) / abs(gain)
     push = usual_acceleration(runs, channel) / abs(gain)
     if not (math.isfinite(push) and push > 0):
-        # recordings too short for an acceleration: assume the range is crossed at that
-        # speed
+        # the recordings are too short for an acceleration: assume that the range is
+        # crossed at the speed `fast`
         push = fast**2 / max(high - low, 1e-300)
     return MotionScales(low, high, fast, push, slip)

@@ -46,7 +46,7 @@ def placing(
     best = Placing(0.0, starts[0])
     for first in range(0, len(starts), together):
         some = starts[first : first + together]
-        # the same number each time, so that one program suffices
+        # padded to the same number each time, so that one program suffices
         filled = [*some, *[some[-1]] * (together - len(some))]
         copies = [dataclasses.replace(term, **start) for start in filled]
         blocks = force_blocks(problem, response, copies)
@@ -79,7 +79,7 @@ def _beside(information, score, free, new):
 def _signed_gain(rest, left, low, high, alike: float) -> float:
     """Return the gain in twice the log-likelihood with strengths of the permitted sign.
 
-    Strengths whose optimum has the other sign stay at zero.
+    Strengths whose optimum has the wrong sign stay at zero.
     """
     open_ = [k for k in range(len(left)) if rest[k, k] > alike]
     while len(open_):

@@ -93,7 +93,7 @@ def refuse_one(runs: Sequence[Recording | Segments]) -> None:
 
 
 def by_listing(terms: tuple[Term, ...]):
-    """Return the terms that may be named, and those that only describe."""
+    """Return the terms that may be named, and those that only describe effects."""
     for term in terms:
         if term.strengths() and not term.acts and not isinstance(term, SensorTerm):
             raise ValueError(
@@ -113,8 +113,8 @@ def by_listing(terms: tuple[Term, ...]):
 
 
 def term_parameters(terms: Sequence[Term], segments, policy: Policy) -> list[Parameter]:
-    """Return the parameters of the terms; a frequency needs enough periods in a
-    recording.
+    """Return the parameters of the terms; the lower bound of a frequency is such that
+    the longest recording contains enough periods.
     """
     longest = max(part.recording.duration for part in segments)
     least = policy.fewest_periods / longest

@@ -1,6 +1,7 @@
-"""Merge a stiffness and a force of the same argument: the stiffness has another centre.
+"""Merge a stiffness and a force of the same argument by moving the stiffness's centre.
 
-`g(a) (q - c)` is `g(a) (q - m)` with an assumed centre m, and the force `(m - c) g(a)`.
+A stiffness `g(a) (q - c)` with an unknown centre c is the sum of a stiffness
+`g(a) (q - m)` about the assumed centre m and the force `(m - c) g(a)`.
 """
 
 import dataclasses
@@ -16,7 +17,7 @@ from ._slots import emptied, Free
 _GRID = 400
 # Number of times the centre is estimated
 _ROUNDS = 2
-# Correlation of the two functions above which they may be one
+# Correlation above which the two functions may be one stiffness
 _ALIKE = 0.9
 
 
@@ -47,14 +48,14 @@ def recentred(fits: FreeFits, found: Missing) -> Missing:
 
 
 def _in_slot(found: Missing, one: Free) -> Free:
-    """Return the function of a fit in the slot of another."""
+    """Return the function of a fit that is in the same slot as a given one."""
     (fresh,) = (f for f in found.functions if f.slot == one.slot)
     assert isinstance(fresh, Free)
     return fresh
 
 
 def _partner(curves: list[Free], one: Free) -> Free | None:
-    """Return the force of the same argument as a stiffness."""
+    """Return the force that depends on the same argument as a stiffness, if any."""
     if one.family.factor is not Factor.DEFLECTION:
         return None
     alike = dataclasses.replace(one.family, factor=Factor.ONE)

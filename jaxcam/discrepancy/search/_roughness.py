@@ -35,9 +35,9 @@ def roughness(
 ) -> Roughness:
     """Return the prior of a function, from the quadratic likelihood about a point.
 
-    With the `free` parameters eliminated, coefficients c of a Gaussian prior with
-    variances V have the marginal likelihood of Rasmussen and Williams, Gaussian
-    Processes for Machine Learning 2006, eq. 2.30, in terms of information and score.
+    With the `free` parameters eliminated, coefficients with a Gaussian prior have the
+    marginal likelihood of Rasmussen and Williams, Gaussian Processes for Machine
+    Learning 2006, eq. 2.30, here expressed by information and score.
 
     **Arguments:** information and score without the prior of the coefficients; rows of
     the free parameters, and of the coefficients of the function, of which the last is
@@ -74,9 +74,9 @@ def occam(
 def beside(information, score, free, own, alike: float):
     """Return information and score of some rows, with the free parameters eliminated.
 
-    If the free parameters represent a combination so well that less than a fraction
-    `alike` of its information remains, both are zero, because only rounding errors
-    would be left.
+    If the free parameters represent a combination of these rows so well that less than
+    a fraction `alike` of the information on it remains, its information and score are
+    zero, because only rounding errors would be left.
     """
     free = np.setdiff1d(free, own)
     free = free[np.diag(information)[free] > 0]
@@ -84,7 +84,7 @@ def beside(information, score, free, own, alike: float):
     across = information[np.ix_(own, free)]
     inside = information[np.ix_(own, own)] - across @ inverse @ across.T
     pull = score[own] - across @ (inverse @ score[free])
-    # rounding may leave a little less than no information
+    # rounding may make the information slightly negative
     size = np.sqrt(np.maximum(np.diag(information)[own], 0.0))
     unit = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
     values, vectors = np.linalg.eigh(inside * np.outer(unit, unit))

@@ -13,7 +13,7 @@ from ._vibration_scan import Periodogram
 
 
 class Search:
-    """The search over subsets; their order depends on more than the largest gain."""
+    """A search over subsets of terms that keeps several good ones of each size."""
 
     def __init__(self, trials: Trials):
         self.trials, self.policy = trials, trials.policy
@@ -54,7 +54,7 @@ class Search:
         return self._sound(bare)
 
     def _sound(self, bare: Trial) -> Trial:
-        """Return the best subset with a completed fit, if the best of all has none.
+        """Return the best of the subsets whose fits are complete.
 
         A candidate whose fit fails must not hide one whose fit succeeds.
         """
@@ -74,8 +74,8 @@ class Search:
     def _settles(self, start: Trial, trial: Trial | None) -> bool:
         """Return whether a subset explains the data although the smaller one did not.
 
-        The predictions of the smaller subset are then unreliable; the quadratic model
-        of this subset determines which others are equally good, and these are fitted.
+        The predictions of the smaller subset are then unreliable. The quadratic model
+        of the larger subset determines which others are equally good; these are fitted.
         """
         enough = self.policy.explained * self.trials.problem.samples
         if trial is None or not trial.fit.cost < enough < start.fit.cost:
@@ -109,7 +109,7 @@ class Search:
     def _smallest(self, best: Trial) -> Trial:
         """Drop terms that are not needed according to the error rate and the BIC."""
         for name in sorted(best.names):
-            # start from here with one term fewer: its own fit may have failed
+            # refit the smaller subset from here, because its own fit may have failed
             self.trials.attempt(best.names - {name}, best, self.policy.iterations)
         for size in range(len(best.names)):
             enough = []
@@ -130,8 +130,8 @@ class Search:
         return other if other.bic < best.bic else best
 
     def _swapped(self, best: Trial) -> Trial:
-        """Return the subsets with one term exchanged that the quadratic model
-        favours.
+        """Return the best subset after exchanging single terms, as the quadratic model
+        suggests.
         """
         for _ in range(self.policy.most_terms):
             if not best.names:

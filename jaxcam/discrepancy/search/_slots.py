@@ -30,13 +30,13 @@ from ._roughness import Roughness
 
 # Number of sines of a function; one more coefficient represents its jump
 _SINES = {Where.FLIGHT: 20, Where.IMPACT: 10, Where.CONTACT: 24, Where.SENSOR: 20}
-# Minimum number of substeps for a force that jumps at edges, so that the steps that
-# contain them are accurate
+# Minimum number of substeps for a force that jumps at edges, so that steps that contain
+# an edge are accurate
 _SUBSTEPS = 8
 # Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
 _ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
-# for each gap, with its number
+# slots for each gap; its number is appended to the label
 _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution"), (Where.CONTACT, "surface"))
 
 
@@ -44,7 +44,7 @@ _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution"), (Where.CONTACT, "surface"))
 class Free:
     """A fitted free function: its family, its prior, and its slot.
 
-    With a `primitive` it has that form, and no smoothness prior.
+    With a `primitive`, the function has that form and no smoothness prior.
     """
 
     family: Family
@@ -154,7 +154,7 @@ def slots_of(problem: Problem, where: Where, gap: int = 0) -> list[str]:
 def free_term(
     family: Family, label: str, primitive: Primitive | None = None
 ) -> FreeFunction:
-    """Return a zero function of a family, with a given form."""
+    """Return a zero function of a family, with a given form if there is one."""
     zero = [0.0] * (_SINES[family.where] + 1)
     return FREE[family.where].of(family, label, zero, primitive)
 

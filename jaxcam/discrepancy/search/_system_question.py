@@ -96,7 +96,7 @@ def system_question(
     """Return the problem of any system; terms of the library act on the coordinate and
     the gap of a `location`.
 
-    **Arguments:** as for `diagnose`; the `stated` constants of the forms, by name; the
+    **Arguments:** as for `diagnose`; the `stated` constants of the terms, by name; the
     channel of a rotating drive, which is searched for ripple; the location.
 
     **Raises:** `ValueError` for recordings that are not segmented, or without sensors.
@@ -162,8 +162,8 @@ def system_question(
 
 
 def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, Any]:
-    """Return the problem with the recordings of a drive and the noise of its
-    encoder.
+    """Return the fields of a `Question` that hold the recordings of a drive and the
+    noise of its encoder.
     """
     if channel is None:
         return {}

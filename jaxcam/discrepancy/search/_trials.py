@@ -143,8 +143,8 @@ class Trials:
     ) -> Fit:
         """Fit from one starting point, and from another one if that fails.
 
-        A fit without the right term may end far from the rig in a long valley of the
-        cost. The nominal parameters are then a better starting point.
+        A fit without the right term may end in a long valley of the cost, far from the
+        nominal rig. The nominal parameters are then a better starting point.
         """
         free = self.parameters(names)
         if start is None:
@@ -158,7 +158,7 @@ class Trials:
         grown = names > start.names
         # individual terms decide which pairs are tried, so they get more iterations
         beaten = start.fit.cost if grown and len(names) > 1 else math.inf
-        # the loss without a term must be accurate if it decides whether to keep it
+        # the loss without a term must be accurate if it decides whether the term stays
         decides = -math.inf
         if names < start.names:
             threshold = sum(self.threshold(name) for name in start.names - names)
@@ -279,7 +279,7 @@ class Trials:
         return True
 
     def _seeded(self, names: frozenset[str], start: Trial, place: Point) -> Point:
-        """Return a starting point; terms not in the other fit have zero strength."""
+        """Return a starting point for a subset; new terms have zero strength."""
         values = np.array(place.values)
         everything = self.problem.names
         for term in self.terms:
@@ -295,8 +295,8 @@ class Trials:
 
 
 def _order(trial: Trial) -> tuple[float, bool]:
-    """Sort key of fits: the smaller cost is better; among equals, an optimum is
-    better.
+    """Return the sort key of a fit: the smaller BIC is better; among equals, an optimum
+    is better.
     """
     return trial.bic, not trial.fit.optimal
 

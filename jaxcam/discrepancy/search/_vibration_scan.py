@@ -1,4 +1,4 @@
-"""Scan frequencies for a vibration: predict the gain of a force at each.
+"""Scan frequencies for a vibration: predict the gain of a harmonic force at each.
 
 A vibration too weak to be visible in the samples of a flight still affects the approach
 speed, and thus the impact and the next flight. The scan therefore uses the complete
@@ -106,8 +106,9 @@ def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, "
 class _Sums:
     """Sums over the pieces of one recording for a force `exp(i w t)` at each frequency.
 
-    `pp`, `p` belong to the parameters; `pf` couples them to the force; `f` is its
-    score, `ff` the sum of squares of its rows and `fc` that of their absolute squares.
+    `pp` and `p` are information and score of the parameters; `pf` couples them to the
+    force. For the force, `f` is the score, `ff` the sum of the squares of its rows, and
+    `fc` the sum of their absolute squares.
     """
 
     def __init__(self, pp, p, rates: int):
@@ -117,8 +118,8 @@ class _Sums:
         self.fc = np.zeros(rates)
 
     def add_piece(self, inner, slope, waves, shaken):
-        """Information `inner` and score of the parameters, then of the nodes of one
-        piece.
+        """Add one piece; the rows of the information `inner` and score `slope` belong
+        to the parameters, then to the nodes of the piece.
         """
         m = len(self.p)
         self.pp += inner[:m, :m]

@@ -17,10 +17,11 @@ def within_tolerances(
     tolerances.
 
     If physics is missing, the data outweigh the known rig parameters, and a fit ends at
-    unrealistic values. The report therefore compares with a rig within its tolerances.
+    unrealistic values. The report therefore compares the fit with terms to a rig within
+    its tolerances.
 
     **Arguments:** fits without and with the terms, the names of the rig parameters, and
-    the policy. The values of the better fit are allowed in any case.
+    the policy. The bounds always include the values of the fit with terms.
 
     **Returns:** `before` itself if it is within the tolerances.
     """

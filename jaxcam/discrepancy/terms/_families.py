@@ -47,8 +47,8 @@ class Family:
     - `middle`: position from which a deflection is measured.
     - `slip`: speed below which the sign of the velocity is smoothed.
     - `motion_unit`: unit of the coordinate.
-    - `stride`: change of the argument of a force in an integration step where it is
-        fast.
+    - `stride`: change of the argument of a force in one integration step of fast
+        motion.
     - `constraint`: index of the gap to which an effect at impacts or of the surface
         belongs.
     """
@@ -112,8 +112,8 @@ class Family:
     def waves(self, count: int) -> tuple[Array, Array]:
         """Return rates and shifts of `count` sines of the argument, each `(count,)`.
 
-        Those of a phase begin with a constant: not every rig has a parameter that
-        represents one, such as the rest position of a spring.
+        For a phase, the first of them is a constant, because not every rig has a
+        parameter that represents a constant, such as the rest position of a spring.
         """
         if self.periodic:
             cosines = np.arange(0.0, count // 2 + 1)
@@ -136,7 +136,7 @@ class Family:
         unit = 1.0 if self.periodic else self.high - self.low
         # spectral density of a Matern kernel of order 3/2 in one dimension
         density = (1 + (rates * unit * length) ** 2 / 3) ** -2.0
-        # a constant stands for the wave of one sign of the rate, the others for both
+        # a sine or cosine stands for rates of both signs, a constant for one rate only
         constant = rates == 0
         density = np.where(constant, density / 2, density)
         squares = np.where(constant, 1.0, 0.5)
@@ -194,7 +194,7 @@ def families(
             sum(positions) / 2,
             slip,
             motion_unit,
-            # other functions are not integrated
+            # functions that are not forces are not integrated
             strides.get(argument, 0.0) if where is Where.FLIGHT else 0.0,
             constraint,
         )
@@ -222,7 +222,7 @@ def families(
 
 
 _TIMELESS = (Variable.POSITION, Variable.VELOCITY)
-# a function of the argument alone is equivalent
+# left out, because a function of the argument alone is equivalent
 _DOUBLED = {
     (Variable.POSITION, Factor.DEFLECTION),
     (Variable.VELOCITY, Factor.VELOCITY),

@@ -27,8 +27,8 @@ class HiddenElement(eqx.Module):
 
     In addition, the force has a `constant` part, a part proportional to the deflection
     of the coordinate from `middle` (`stiffness`), and a part proportional to its
-    velocity (`damping`). They are needed if a resonance alone does not represent the
-    transfer function.
+    velocity (`damping`). These parts are needed if the internal state alone does not
+    represent the transfer function.
     """
 
     names: ClassVar[tuple[str, ...]]
@@ -45,7 +45,7 @@ class HiddenElement(eqx.Module):
 
     @abc.abstractmethod
     def units(self, unit: str) -> tuple[str, ...]:
-        """Return the units of the internal state, given that of the coordinate."""
+        """Return the units of the internal state, given the unit of the coordinate."""
 
     @abc.abstractmethod
     def scales(self) -> tuple[FloatScalar, ...]:
@@ -164,9 +164,9 @@ class Relaxation(HiddenElement):
 class Hysteresis(HiddenElement):
     """Bouc-Wen hysteresis, `z' = v (1 - c (b sign(v z) + 1 - b) |z / limit|^n)`.
 
-    The force is `by_state * z`; b is `beta`, n is `power`, c is `loading`. Its
-    stiffness changes by `-c` times the last factor during loading, and by
-    `-c (1 - 2 b)` times that during unloading (Wen 1976, with beta + gamma = c).
+    The force is `by_state * z`; b is `beta`, n is `power`, c is `loading`. With
+    s = `|z / limit|^n`, the slope dz/dq is `1 - c s` during loading and
+    `1 - c (1 - 2 b) s` during unloading (Wen 1976, with beta + gamma = c).
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
@@ -177,8 +177,8 @@ class Hysteresis(HiddenElement):
     value of the state if `loading` is 1.
     """
     beta: FloatScalar = _field(0.5)
-    """Part b that changes its sign at a reversal. Energy is dissipated if `b * loading`
-    is positive.
+    """Coefficient b of the part that changes sign at a reversal. Energy is dissipated
+    if `b * loading` is positive.
     """
     power: FloatScalar = _field(1.0)
     """Sharpness n of the transition."""

@@ -35,12 +35,12 @@ from ._with_terms import WithTerms
 
 
 def _reference(default: float):
-    """A constant of a form, which is not fitted; files of earlier versions omit it."""
+    """Declare a constant of a term that is not fitted; a saved file may omit it."""
     return eqx.field(default=default, static=True, metadata={"spare": True})
 
 
-# Share of dry friction up to which an applied force is balanced exactly; width over
-# which the balance then fades; a force far beyond both
+# Applied forces in units of the dry friction: up to the first, friction balances them
+# exactly; the balance fades over the second; the third is far beyond both
 _HELD, _FADE, _MANY = 0.99, 0.5, 1e3
 
 
@@ -79,15 +79,15 @@ class CoulombFriction(Term):
     def acceleration(self, motion: Motion):
         share = _share_of(motion.pushed, self.fc)
         size = jnp.abs(share)
-        # a body under a force above its friction reverses smoothly
+        # if the force exceeds the friction, the velocity of the body reverses smoothly
         held = jnp.where(size < 1, size, jnp.clip((1 + _FADE - size) / _FADE, 0.0, 1.0))
         balance = jnp.sign(share) * jnp.arctanh(jnp.minimum(held, _HELD))
         return -self.fc * jnp.tanh(motion.velocity / self.slip + balance)
 
 
 def _share_of(push, friction):
-    """Return the applied force in units of the friction; a large number without
-    friction.
+    """Return the applied force in units of the friction, or a large number if there is
+    no friction.
     """
     some = friction > 0
     return jnp.where(some, push / jnp.where(some, friction, 1.0), _MANY)
@@ -299,11 +299,12 @@ def library(
         references: Constants of a rig that occur in the terms (`rig.references`),
             such as the centre of a nonlinear spring or the reference speed of a
             restitution law.
-        clocked: Whether times are known absolutely, from a drive (the default) or a
-            measured input. Otherwise, a sensor lag is only a shift of the time origin.
+        clocked: Whether a drive or a measured input fixes the time origin (default:
+            the value of `turned`). If nothing fixes it, a sensor lag is the same as a
+            shift of the time origin, and the term for a lag is omitted.
         extended: Whether to add terms that most rigs already have as parameters, or
-            that take longer to search: position-dependent forces with an edge, friction
-            that depends on direction, speed or position, and a power law of
+            that take longer to search for: position-dependent forces with an edge,
+            friction that depends on direction, speed or position, and a power law of
             restitution. The constants of these terms come from the recordings.
 
     Returns:

@@ -29,7 +29,7 @@ class Location(NamedTuple):
         return dataclasses.replace(term, constraint=self.constraint)
 
     def reordered(self, term: Term, coordinates: int) -> Term:
-        """Return a term of one's own, which keeps its coordinate in the new order.
+        """Return a user's term with the index of its coordinate in the new order.
 
         **Raises:** `ValueError` if there is no such coordinate.
         """
@@ -59,8 +59,8 @@ class Location(NamedTuple):
 
 
 def other_locations(problem: Problem) -> list[Location]:
-    """Return the locations at another measured coordinate or another gap than the
-    first.
+    """Return the locations other than the first: the other measured coordinates, and
+    the other gaps.
     """
     system, sensors = problem.model.system, problem.model.sensors
     pairs = system.coordinates  # pyright: ignore

@@ -33,7 +33,7 @@ class ScaledTerm(Term):
     def scaled(self, scales: MotionScales) -> "ScaledTerm":
         found = dataclasses.replace(self, ranges=tuple(scales))
         starts = found.starts()
-        # a position in the range, until it is fitted
+        # until they are fitted, inner parameters have the middle starting value
         inner = starts[len(starts) // 2] if starts else {}
         return dataclasses.replace(found, **inner)
 

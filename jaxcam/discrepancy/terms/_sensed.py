@@ -10,8 +10,8 @@ from ._with_terms import drive_at
 
 
 def watched(model: Model) -> Model:
-    """Return the model with a sensor whose reading includes the sensor errors among its
-    terms.
+    """Return the model with the sensor errors among its terms added to the reading of
+    the first coordinate's sensor.
     """
     if not any(Where.SENSOR in term.acts for term in terms_of(model)):
         return model
@@ -25,8 +25,8 @@ _FAULTS = ("gain", "offset", "lag")
 
 
 def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter]:
-    """Return the gain, offset and lag of that sensor as parameters, except those that
-    are parameters already.
+    """Return the gain, offset and lag of the first coordinate's sensor as parameters,
+    except those that are parameters already.
     """
     known = set(own_faults(model, parameters))
     taken = [one.where(model) for one in parameters if one.name in known]
@@ -42,8 +42,8 @@ def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter
 
 
 def own_faults(model: Model, parameters: Sequence[Parameter]) -> list[str]:
-    """Return the names of the parameters that are gain, offset or lag of that
-    sensor.
+    """Return the names of the parameters that are the gain, offset or lag of the first
+    coordinate's sensor.
     """
     sensor = model.sensors[watching(model)]
     fields = [getattr(sensor, field) for field in _FAULTS]

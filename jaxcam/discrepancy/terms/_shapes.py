@@ -1,4 +1,4 @@
-"""Forces, restitutions and surfaces as free functions of one variable.
+"""Forces, restitution, surfaces and sensor errors as functions of one variable.
 
 A shape is not a verdict. If no named term explains the residual, a shape shows where
 the residual occurs and how it varies.

@@ -61,8 +61,8 @@ class SwitchedWithTerms(WithTerms, _Around):
 
 
 class SwitchedWithHidden(WithHidden, _Around):
-    """A switched system with an element that has an internal state, which does not
-    change at the surfaces.
+    """A switched system with an element that has an internal state; this state does not
+    change at the switching surfaces.
     """
 
     base: SwitchedSystem

@@ -52,7 +52,7 @@ MOTION = "[q]"
 """Placeholder in units for the unit of the coordinate on which a term acts."""
 
 
-# files that do not specify where a term acts have the default
+# saved systems may omit these fields, which then have their defaults
 _SPARE = {"spare": True}
 
 
@@ -159,7 +159,7 @@ class Term(eqx.Module):
     corner: ClassVar[bool] = False
     """Whether the force jumps, like dry friction, and is therefore smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
-    """Parts of the model in which it acts."""
+    """Parts of the model in which the term acts."""
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
     """Index of the coordinate on which the force acts and whose position and velocity
     the term uses.
@@ -225,7 +225,9 @@ class Term(eqx.Module):
         return self
 
     def exact(self) -> "Term":
-        """Return the term with the derivatives of its values, for use outside a fit."""
+        """Return the term for use outside a fit: its derivatives are exact instead of
+        averaged over an integration step.
+        """
         return self
 
     def strengths(self) -> tuple[Strength, ...]:

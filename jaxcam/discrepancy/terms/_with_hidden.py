@@ -75,7 +75,7 @@ class WithHidden(HybridSystem):
         return state[: -self._size]
 
     def _driven(self, state, rate) -> jax.Array:
-        """Return the field, for a field of the base."""
+        """Return the rate of change of the state, given that of the base."""
         own, hidden = state[: -self._size], state[-self._size :]
         place, pushed = self.coordinate
         position, velocity = own[place], own[pushed]
@@ -89,7 +89,7 @@ class WithHidden(HybridSystem):
         return self._kept(state, self.base.impact(t, self._own(state)))
 
     def _kept(self, state, after) -> jax.Array:
-        """Return states of the base after an event, and the state of the element."""
+        """Return base states after an event, followed by the state of the element."""
         hidden = state[-self._size :]
         kept = jnp.broadcast_to(hidden, (*after.shape[:-1], self._size))
         return jnp.concatenate([after, kept], axis=-1)

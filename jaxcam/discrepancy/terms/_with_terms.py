@@ -20,7 +20,7 @@ class WithTerms(HybridSystem):
     base: HybridSystem
     """The system."""
     terms: tuple[Term, ...] = ()
-    """Terms added to it; they have no effect while their strengths are zero."""
+    """Terms added to the system; they have no effect while their strengths are zero."""
     coordinates: tuple[tuple[int, int], ...] = eqx.field(
         default=((0, 1),), static=True, metadata={"spare": True}
     )
@@ -141,9 +141,9 @@ class WithTerms(HybridSystem):
                 motion = self.motion(t, state, term.coordinate, field)
                 factor = factor * term.restitution(jnp.abs(speed), motion)
             if len(self.coordinates) > 1:
-                # in the direction of the impulse, which is distributed among the
-                # bodies: the change of state according to the law for unit normal
-                # velocity, divided by its change of normal velocity
+                # the impulse is distributed among the bodies: its direction is the
+                # change of state that the impact law gives for unit normal velocity,
+                # scaled to unit change of normal velocity
                 _, kept = jax.jvp(law, (seen,), (push,))
                 taken = push - kept
                 push = taken / self._along(t, state, number, taken)

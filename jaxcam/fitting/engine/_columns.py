@@ -1,4 +1,4 @@
-"""Locate the free values of a fit, with their priors and normal equations."""
+"""Index the free values of a fit; form their priors and normal equations."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -102,7 +102,7 @@ def held_firmer(columns: Columns, blocks: Blocks):
 
 
 def gathered(columns: Columns, found):
-    """Sum over the recordings, adding each value in its place."""
+    """Return information and score of the free values, summed over the recordings."""
     size = len(columns.scale)
     information, score = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
     each = zip(columns.place, np.asarray(found.information), np.asarray(found.score))
@@ -151,7 +151,7 @@ def invert_information(
 
 
 def off_nominal(problem: Problem, columns: Columns, point: Point):
-    """Return the distance of each free value from nominal, in units of its scale.
+    """Return the deviation of each free value from nominal, in units of its scale.
 
     Args:
         problem: The problem.
@@ -159,7 +159,7 @@ def off_nominal(problem: Problem, columns: Columns, point: Point):
         point: The values.
 
     Returns:
-        Distances, shape `(g,)`.
+        Deviations, shape `(g,)`.
     """
     values = np.asarray(point.values)
     now = values[np.maximum(columns.record, 0), columns.parameter]

@@ -41,7 +41,7 @@ def _state_gain(blocks: Blocks, found) -> float:
 
 
 def _bounded(problem, columns, point, information, score, damping):
-    """Compute Newton's step with the numbers at an active bound held."""
+    """Compute the damped step; values that would pass a bound are held at it."""
     size = len(columns.scale)
     change = np.zeros(size)
     if not size:

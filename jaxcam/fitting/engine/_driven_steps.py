@@ -63,8 +63,8 @@ def input_in_steps(
     """Return the mean and the slope of each recording's input in every step, `(r, k,
     n)`.
 
-    A linear input with them has the integral and the first moment of the held samples:
-    a step that contains a jump would otherwise leave an error of position.
+    A linear input with this mean and slope has the same integral and first moment as
+    the held samples; otherwise, a jump within a step would cause an error of position.
     """
     step = np.diff(edges)
     mean, slope = np.zeros(step.shape), np.zeros(step.shape)
@@ -73,7 +73,7 @@ def input_in_steps(
         first, second = _integrals(time, level, edges[row])
         h = step[row]
         mean[row] = np.diff(first) / h
-        # by parts: the moment about the middle of a step
+        # the moment about the middle of a step, integrated by parts
         moment = h / 2 * (first[:, 1:] + first[:, :-1]) - np.diff(second)
         slope[row] = 12 * moment / h**3
     return DriveState(mean, slope, np.zeros(step.shape))
@@ -94,25 +94,25 @@ def _integrals(time, level, at):
 class DriveError(NamedTuple):
     """Standard errors of each recording's drive, `(r,)`.
 
-    A system without a field for the acceleration is driven at a uniform rate. The
-    forces of an acceleration are as large as those of an error `acceleration / (2
-    rate)` of the rate, for a base that moves with the drive. They act over the time in
-    which the rate changes, which is longer than a piece; the last two errors are
+    A system without a field for the acceleration is driven at a uniform rate. For a
+    base that moves with the drive, the forces due to an acceleration are as large as
+    those due to an error of `acceleration / (2 rate)` in the rate. These forces act for
+    as long as the rate changes, which is longer than a piece; the last two errors are
     enlarged accordingly.
     """
 
     angle: Numbers
-    """Of the smoothed angle (rad)."""
+    """Standard error of the smoothed angle (rad)."""
     rate: Numbers
-    """Of the smoothed rate (rad/s)."""
+    """Standard error of the smoothed rate (rad/s)."""
     turned: Numbers
-    """Of the integral of the smoothed rate (rad)."""
+    """Standard error of the integral of the smoothed rate (rad)."""
     mean: Numbers
-    """Of the mean angle over one second (rad)."""
+    """Standard error of the mean angle over one second (rad)."""
     unsteadiness: Numbers
-    """Of the rate (rad/s), if the acceleration is neglected."""
+    """Standard error of the rate (rad/s), if the acceleration is neglected."""
     acceleration: Numbers
-    """Of the acceleration (rad/s^2)."""
+    """Standard error of the acceleration (rad/s^2)."""
 
 
 def drive_error(segments: Sequence[Segments], steps: int) -> DriveError:
@@ -138,7 +138,7 @@ def _errors(part: Segments, length: float) -> tuple[float, ...]:
 
 
 def _unsteadiness(drive: Drive, length: float) -> float:
-    """Return the error of the rate (rad/s) that stands for its changes."""
+    """Return the error of the rate (rad/s) that represents its neglected changes."""
     slow = drive.acceleration
     square = float(np.mean(slow.values**2)) - 2 * slow.stderr**2
     # a few independent values scatter by about as much as their mean

@@ -13,7 +13,7 @@ from ...hybrid.caches import Cache
 
 
 T = TypeVar("T")
-# calls that need not compile
+# kinds of arguments for which the program is compiled
 _COMPILED = Cache(4096)
 
 

@@ -117,7 +117,7 @@ def _eliminate(blocks: Blocks, part):
         blocks.pp,
         blocks.p,
     )
-    # the coupling belongs to the later piece; elimination needs it at the earlier one
+    # the coupling is stored with the later piece, but needed at the earlier one
     after = jnp.concatenate([blocks.before[1:], jnp.zeros_like(blocks.before[:1])])
     inputs = (blocks.ss, blocks.sp, blocks.s, after)
     carry, gain = jax.lax.scan(forwards, start, inputs)

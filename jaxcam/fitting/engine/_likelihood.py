@@ -64,7 +64,8 @@ def _rounded(sensor: Sensor, off) -> Scored:
     """Return the likelihood of noise followed by rounding: the probability of an
     interval.
 
-    With z = (off +- resolution / 2) / noise, it is Phi(z_high) - Phi(z_low).
+    The probability is Phi(z_high) - Phi(z_low), with z = (off +- resolution / 2) /
+    noise.
     """
     half = sensor.resolution / 2 / sensor.noise
     # evaluated by symmetry in the lower tail, where differences remain accurate
@@ -77,8 +78,8 @@ def _rounded(sensor: Sensor, off) -> Scored:
     variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
     slope = -jnp.sign(off) * pull / sensor.noise
-    # far out, which only bad starts reach, the cost is steeper than the mean
-    # information predicts, and a step based on it alone would go too far
+    # far from the interval, where only bad starts lead, the cost is steeper than the
+    # mean information predicts, and a step based on that alone would go too far
     far = jnp.abs(off) > sensor.resolution / 2 + _FAR * sensor.noise
     safe = jnp.where(far, off, 1.0)
     information = jnp.where(far, slope / safe, 1 / variance)

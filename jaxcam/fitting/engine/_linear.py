@@ -144,8 +144,8 @@ def linear_pieces(
 def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, shown):
     """Linearise the pieces in flight.
 
-    **Returns:** their ends and the rows of these, their costs, and information and
-    score of their samples.
+    **Returns:** for each piece, the state at its end and the derivatives of this state,
+    the cost, and information and score of the samples.
     """
     part = pieces.flown
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
@@ -220,7 +220,7 @@ def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, ori
 
 def _normal(rows, information, score):
     """Return the information and score of a piece, summed over its samples."""
-    # one matrix product a piece: a product of three arrays takes twice as long
+    # one matrix product per piece: a product of three arrays takes twice as long
     rows = rows.reshape(-1, rows.shape[-1])
     information, score = (a.reshape(-1, 1) for a in (information, score))
     return rows.T @ (information * rows), (rows.T @ score)[:, 0]

@@ -80,7 +80,7 @@ def assemble(
     """Linearise about a point; recordings are distributed over the cores.
 
     Args:
-        layout: The location of the parameters.
+        layout: The location of the parameters in the model.
         pieces: The pieces of all recordings.
         extras: Further arguments of the compiled programs.
         point: The point.
@@ -105,7 +105,9 @@ def assemble(
 
 @program
 def assemble_one(near, pieces, extras, states, columns, scales, row, shown):
-    """Apply `assemble` to one recording; its index is not part of the program."""
+    """Apply `assemble` to one recording; its index `row` is an argument of the compiled
+    program, not a constant.
+    """
     one = pieces, extras, states, columns, scales
     pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
     near = near.by(columns, scales)
@@ -127,7 +129,7 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 
 def _predicted(layout, pieces, extras, point):
-    # one number for all recordings, so that its loops have one condition
+    # the same number for all recordings, so that their loops can be run as one
     substeps = jnp.max(pieces.substeps)
 
     def record(pieces, extras, values, states):
@@ -234,7 +236,7 @@ def total_cost(costs: Costs, extras) -> float:
     total = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
         for weight, cost in _weighted(extras.weight, extras.rest_weight, costs):
-            # data with zero weight have no cost, also if they are not finite
+            # data with zero weight have no cost, even if they are not finite
             total += np.sum(np.where(weight > 0, weight * cost, 0.0))
     return float(total)
 

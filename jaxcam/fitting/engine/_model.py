@@ -210,11 +210,11 @@ class Model(eqx.Module):
         return self.drive.at(self.system, t, drive)
 
     def uniform(self, angle, rate) -> HybridSystem:
-        """Return the system with its drive turning uniformly, from an encoder angle
-        (rad) at time zero at a rate (rad/s).
+        """Return the system with its drive turning uniformly at a rate (rad/s); `angle`
+        is the encoder angle (rad) at time zero.
         """
-        # arrays, because numbers would be constants of a program compiled for each
-        # recording
+        # arrays, because numbers would be compiled as constants, with a separate
+        # program for each recording
         state = DriveState(*(jnp.asarray(x, float) for x in (angle, rate, 0.0)))
         return self.driven(0.0, state)
 

@@ -22,7 +22,8 @@ from ...hybrid.surface import (
 )
 
 
-# a slip below this fraction of what friction can change within a piece may be zero
+# A slip velocity below this fraction of the change that friction can cause within a
+# piece may be zero
 _STOPPED = 0.01
 
 
@@ -34,7 +35,7 @@ class Mode(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """What the structure of a switched system determines."""
+    """Properties of a switched system that follow from its structure."""
 
     number: int
     jumps: Jumps
@@ -59,9 +60,10 @@ def surfaces_in(system: HybridSystem, t, x) -> Surfaces:
 def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
     """Return the mode in which a piece of a motion starts.
 
-    A body that kinetic friction can hold begins to slide in the first step. A larger
-    load may be held by static friction, or not: the motion slides from the start if its
-    velocity is small, compared with what the friction can change.
+    While friction holds a body at rest, the motion slides along the surface of zero
+    slip. If kinetic friction can hold the body, this sliding begins in the first step.
+    Under a larger load, which only static friction can hold, the motion slides from the
+    start if its slip is small compared with the change that friction can cause.
 
     Args:
         known: The surfaces.
@@ -99,7 +101,7 @@ def on_side_of(system: HybridSystem, t, x) -> HybridSystem:
 
 
 def distances_along(system: InMode, t, x, rate):
-    """Return the distances and their rates when `x` changes at `rate`, `(k,)` each."""
+    """Return switching distances and, if `x` changes at `rate`, their rates, `(k,)`."""
     along = jnp.ones_like(t), rate
     return jax.jvp(lambda s, y: switching_distances(system, s, y), (t, x), along)
 

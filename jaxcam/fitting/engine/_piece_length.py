@@ -1,4 +1,4 @@
-"""Limit the length of a flight's pieces: half an oscillation of the measured motion."""
+"""Limit the pieces of a flight to half an oscillation of the measured motion."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,8 +6,8 @@ from jaxtyping import Float
 
 # Shorter pieces would hardly determine their own initial states
 _SHORTEST = 12
-# The residual of a cubic must be less than this fraction of that of a straight line: a
-# sine passes up to about half of its period
+# The residual of a cubic must be less than this fraction of that of a straight line;
+# for a sine, this is so up to about half of its period
 _PART = 0.05
 # Residuals up to this multiple of the noise count as noise, regardless of curvature
 _NOISE = 2.0

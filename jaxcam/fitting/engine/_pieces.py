@@ -24,9 +24,9 @@ from ._piece_length import bearable_length
 # Maximum number of samples in a piece: enough for its own initial state, short compared
 # with the time over which impacts magnify an error
 _PIECE = 100
-# A flight with fewer samples than the first number gives no information by itself;
-# between two impacts, the second number determines its velocity and links the flights
-# before and after it
+# A flight with fewer samples than the first number gives no information by itself; for
+# a flight between two impacts, the second number of samples suffices, which determine
+# its velocity and thus link the flights before and after it
 _LEAST, _TIED = 8, 3
 # The number of samples in a step is rounded up to a multiple of this
 _SHARED = 4
@@ -58,8 +58,8 @@ class Pieces(eqx.Module):
     - `exists`: false where padded.
     - `drive` `(r, k, n)`: angle and acceleration of the drive in the middle of each
         step, and its mean rate; or the mean and slope of an input. `drive_at` `(r, k)`:
-        at the beginning of each piece. `rest_drive` `(r, kc, n + 1)`: at each node of
-        contact.
+        its motion at the beginning of each piece. `rest_drive` `(r, kc, n + 1)`: its
+        motion at each node of contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
     - `drive_error`: standard errors of each recording's drive.
     - `substeps` `(r,)`: number of parts into which a prediction divides each step, the
@@ -123,7 +123,7 @@ def spans(
             before = None
             continue
         if flight.start.kind == "release":
-            # no piece without samples, where the time of release is uncertain
+            # the time of release is uncertain: begin with the first sample
             begin = float(time[rows[0]])
         longest = _PIECE
         for name in curved:
@@ -168,7 +168,7 @@ def _margin(edge, interval: float) -> float:
         return edge.stderr
     error = edge.stderr if np.isfinite(edge.stderr) else interval
     least = interval / 2 + 2 * min(error, 2 * interval)
-    # a flight that appears to begin too early would be fitted to a contact
+    # a flight that began too early would be fitted to samples of the contact
     return max(least, error) if edge.kind == "release" else least
 
 
@@ -198,7 +198,7 @@ def gather(
             "recording in which the motion leaves the surface."
         )
     width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
-    # empty without a contact, whose part of a program is then not compiled
+    # zero without contacts, so that the program for contacts is not compiled
     resting = 32 * -(-max(len(rested) for _, rested in cuts) // 32)
     most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))
     both = [

@@ -43,7 +43,7 @@ fit)` returns the score and information of all parameters at once, free or not, 
 which the gain of each candidate follows by linear algebra (`Linearised.gain`).
 `weights` (one per piece) omit recordings or blocks without recompilation.
 `held_out_cost(problem, found, weights)` is the cost of held-out data: the states of
-their pieces are fitted to them, but not the parameters.
+the held-out pieces are fitted to these data, but the parameters are not.
 """
 
 import dataclasses

@@ -1,4 +1,4 @@
-"""Which parameters the sensors show other than through motion and calibration."""
+"""Find parameters that affect samples other than through motion and calibration."""
 
 import jax
 import jax.numpy as jnp
@@ -17,10 +17,10 @@ _KNOWN = Cache()
 
 
 def shows_directly(layout: Layout, pieces: Pieces, columns, scales) -> bool:
-    """Return whether a sensor shows one of the free parameters directly.
+    """Return whether one of the free parameters affects samples directly.
 
     Args:
-        layout: The location of the parameters.
+        layout: The location of the parameters in the model.
         pieces: The pieces.
         columns: The free parameters, shape `(r, m)`.
         scales: Their scales; zero for padding, shape `(r, m)`.
@@ -36,7 +36,7 @@ def shows_directly(layout: Layout, pieces: Pieces, columns, scales) -> bool:
 
 def seen_directly(layout: Layout, pieces: Pieces) -> tuple[bool, ...]:
     """Return for each parameter whether a sample depends on it at given nodes of the
-    motion and a given calibration of the sensors: that of an error of a sensor.
+    motion and a given calibration of the sensors, as in the `error` of a sensor.
     """
     *_, n, m, c = pieces.flown.value.shape
     key = kinds((layout, n, m, c))

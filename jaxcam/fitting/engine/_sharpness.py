@@ -17,9 +17,9 @@ from ._predict import after_impact, fly, smallest_gap
 # Standard error of a joint within a flight, relative to that of the state from the
 # samples
 JOINT = 1e-3
-# Standard error of an impact joint, relative to those of the flights on both sides:
-# losing a tenth of their variance is negligible, and it removes the effects of chaos
-# and of small model errors
+# Standard error of an impact joint, relative to those of the flights on both sides: it
+# adds a negligible tenth to their variance, and removes the effects of chaos and of
+# small model errors
 _IMPACT = 10**-0.5
 _WIDTH = 4
 # Number of columns above which the width of a program follows the number of free
@@ -30,8 +30,8 @@ _FEW_STEPS = 20
 
 
 def width_of(number: int) -> int:
-    """Return the number of columns of compiled programs: a multiple of four, to
-    share them.
+    """Return the number of columns of a compiled program: a multiple of four, so that
+    similar fits share a program.
     """
     return _WIDTH * max(1, -(-number // _WIDTH))
 
@@ -146,12 +146,11 @@ def _variances(ss, before):
 @program
 def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     """Return the error of each piece's initial state, `(r, k, n)`, due to the noise of
-    the drive during the previous piece, and to its acceleration.
+    the drive during the previous piece, and to the acceleration of the drive.
 
-    The noise of the samples is independent, that of the smoothed angle, rate and
-    acceleration is not.
-    Integration by parts turns the effect of the rate into one of the angle; what
-    remains at the ends of a piece cancels between neighbours.
+    The noise of the samples is independent; that of the smoothed angle, rate and
+    acceleration is not. Integration by parts turns the effect of the rate into one of
+    the angle; the terms at the ends of a piece cancel between neighbours.
     """
 
     def one(values, error, states, start, step, drives):

@@ -35,10 +35,10 @@ def longest_flight(cuts) -> int:
 
 
 def follows_inputs(model: Model, segments, pieces: Pieces) -> bool:
-    """Return whether the steps are short compared with sensor filters and input.
+    """Return whether the steps resolve the input and the sensor filters.
 
-    A filter is not settled after an impact, which the initial states do not account
-    for.
+    After an impact, a filter has not settled, and the initial states do not account for
+    this.
     """
     longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
     interval = min(part.recording.interval for part in segments)
@@ -100,7 +100,7 @@ def _off_middles(layout: Layout, pieces: Pieces, point: Point):
     """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
 
     def one(model, state, start, step, drive):
-        # drive and input are linear within a step: their values in its halves
+        # the values in the halves of a step, within which drive and input are linear
         twice = DriveState(*(jnp.repeat(part, 2, axis=-1) for part in drive))
         quarter = jnp.tile(jnp.array([-0.25, 0.25]), drive.angle.shape[-1]) * step
         twice = twice._replace(angle=twice.angle + quarter * twice.rate)

@@ -30,8 +30,8 @@ from ._modes import (
 
 # Events that are located in a piece; pieces are shorter than half an oscillation
 EVENTS = 8
-# Runge-Kutta steps that locate an event: to the end, of length zero, and those of the
-# Illinois method
+# Runge-Kutta steps that locate an event: one to the end, one of length zero, and those
+# of the Illinois method
 _SEARCH = 10
 
 
@@ -142,7 +142,9 @@ def has_more_events(model: Model, state, start, step, drive: DriveState, substep
 
 
 def _ended(model: Model, state, start, step, drive: DriveState, substeps, events):
-    """Return the end of a piece of at most that many events, without derivatives."""
+    """Return the end of a piece, without derivatives; at most `events` events are
+    located.
+    """
     steps, mode = _steps(model, state, start, step, drive, None, events)
     advance = _advancing(steps, substeps)
     return jax.lax.while_loop(
@@ -196,19 +198,19 @@ def _located(steps: _Steps, state, mode: Mode, substeps) -> Located:
         further,
         (_begun(steps, state, mode), False, nothing, jnp.asarray(0), empty),
     )
-    # the others are empty parts after the last step
+    # the unused parts are empty and follow the last step
     other = jnp.arange(room)[:, None] >= used
     final = Mode(*(jnp.where(other, a, b) for a, b in zip(last.mode, parts.mode)))
     return Located(parts._replace(mode=final), last.state, last.mode)
 
 
 class _Place(NamedTuple):
-    """How far the search for events has come."""
+    """Progress of the search for events."""
 
     place: Int[Array, ""]
-    """Number of substeps that are finished."""
+    """Number of finished substeps."""
     passed: Float[Array, ""]
-    """Time since then (s)."""
+    """Time since the end of the last finished substep (s)."""
     state: Float[Array, " s"]
     mode: Mode
     events: Int[Array, ""]
@@ -226,7 +228,7 @@ def _advancing(steps: _Steps, substeps):
 
     def advance(carried: _Place):
         place, passed, x, mode, events = carried
-        # a piece that is finished waits for the others
+        # a finished piece waits for the others of its batch
         inside = jnp.minimum(place, count - 1)
         number = inside // substeps
         within = jnp.asarray(inside - number * substeps, dtype=float)
@@ -256,8 +258,8 @@ class _Reached(NamedTuple):
 def _first_event(steps: _Steps, number, t, x, mode: Mode, left, wanted) -> _Reached:
     """Return the first event within some time, or the motion at its end.
 
-    The smallest of the distances that are negative at the end falls through zero at the
-    first event.
+    Among the distances that are negative at the end, the smallest one crosses zero at
+    the first event.
     """
     field, system_at = steps.field(number, mode), steps.in_mode(number, mode)
     size = steps.size
@@ -273,7 +275,7 @@ def _first_event(steps: _Steps, number, t, x, mode: Mode, left, wanted) -> _Reac
         least = jnp.argmin(jnp.where(crossed, distances, jnp.inf))
         value, last = distances[least], (least, trial, there)
         beyond = (value < 0) & (turn != 1)
-        # the value at an end that stays twice is halved
+        # Illinois method: if an end is kept twice, its value is halved
         low_kept = jnp.where((turn > 2) & beyond & (kept == 1), low / 2, low)
         high_kept = jnp.where((turn > 2) & ~beyond & (kept == 2), high / 2, high)
         return (

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from ._predict import Calibration, Nodes
 
 
-# Quantities on which a sample depends, those of its step and those of its sensor
+# Numbers of quantities on which a sample depends: those of its step and of its sensor
 _OF_STEP, _OF_SENSOR = len(Nodes._fields), len(Calibration._fields)
 
 
@@ -57,7 +57,7 @@ def normal_through(
 
     Args:
         nodes: Derivatives of the nodes with respect to the columns, each `(n, c, a)`.
-        sensing: Those of the calibration, each `(c, a)`.
+        sensing: Derivatives of the calibration, each `(c, a)`.
         shares: From `shares_of`.
         information: Information of each sample.
         score: Score of each sample.
@@ -77,12 +77,12 @@ def normal_through(
 
 
 def _joined(left, right):
-    """Return what belongs to each end of a step, `(n + 1, c, a)`."""
+    """Return the derivatives at the ends of all steps in a row, `(n + 1, c, a)`."""
     return jnp.concatenate([left, right[-1:]])
 
 
 def _summed(parts):
-    """Sum over all steps what belongs to one end of a step or one sensor, a row each.
+    """Return the sums of the parts that share a node or a sensor, one row for each.
 
     **Arguments:** the parts `(q, n, c, a)` of each quantity of each step.
     """

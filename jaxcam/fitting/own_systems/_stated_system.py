@@ -120,7 +120,7 @@ def _unknown(
 
 
 def _refuse_broken(file: Path, system: HybridSystem) -> None:
-    """Raise `RigError` for functions that fail, or return a wrong shape."""
+    """Raise `RigError` for functions that fail or return arrays of the wrong shape."""
     name, count = type(system).__name__, len(system.state_names)
     if not count:
         raise RigError(

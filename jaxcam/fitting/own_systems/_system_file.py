@@ -15,9 +15,9 @@ from ...recordings import RigError
 from ...recordings.files import printable
 
 
-# maximum number of characters repeated from a foreign message
+# maximum number of characters quoted from the message of another error
 _MOST = 200
-# programs are compiled for classes, so an unchanged file is not executed again
+# programs are compiled for classes, so an unchanged file must not create new ones
 _loaded: dict[Path, tuple[bytes, ModuleType]] = {}
 
 

@@ -71,7 +71,7 @@ class PublishedFit:
         units = np.where(finite, tolerances, np.where(nominal == 0, 1, np.abs(nominal)))
         scaled = jacobian * units
         information = scaled.T @ scaled
-        # a parameter without a prior has no prior share
+        # a parameter without a prior has no prior information
         prior = np.diag(finite.astype(float))
         inverse = np.linalg.pinv(information + prior, hermitian=True)
         eigenvalues, vectors = np.linalg.eigh(information)

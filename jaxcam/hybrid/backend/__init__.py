@@ -2,9 +2,9 @@
 
 XLA compiles an iteration as hundreds of inner loops over a batch and passes values
 between them through memory. Here, a single loop contains one iteration for as many
-batch elements as fit into a vector register, and replaces elements that end. It is used
-for runs that are not traced. The program is the same; results differ only by rounding
-errors.
+batch elements as fit into a vector register, and replaces elements that end. This
+backend is used for runs that are not traced. The traced iteration is the same as for
+XLA; results differ only by rounding errors.
 """
 
 from ._attempts import (

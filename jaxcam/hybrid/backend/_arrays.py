@@ -39,7 +39,8 @@ def known(elements: np.ndarray) -> bool:
 
 @no_type_check
 def moved(equation, inputs) -> list[np.ndarray]:
-    """Return the source index of each element, by applying the operation to indices.
+    """Return the elements in the order in which an operation puts them, which is found
+    by applying the operation to indices.
 
     Operands that are indices must be known.
     """
@@ -87,7 +88,7 @@ def _indices_of(name: str, count: int) -> tuple[int, ...]:
     return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
 
 
-# scatters that combine old and new values, and the operation
+# scatters that combine old and new values, each with its operation
 SCATTERS = {
     "scatter-add": "add",
     "scatter-sub": "sub",
@@ -132,7 +133,7 @@ def has_known_indices(equation, inputs) -> bool:
 
 @no_type_check
 def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
-    """Emit a rearrangement by unknown indices: compare with all possible ones."""
+    """Emit a rearrangement by unknown indices, compared with all possible ones."""
     name = equation.primitive.name
     if name in ("dynamic_slice", "dynamic_update_slice"):
         return _sliced(w, equation, inputs, dtypes)
@@ -234,7 +235,7 @@ def _by_comparison(w: Writer, equation, inputs, places, room, clips, dtypes):
 
 
 def value_of(w: Writer, element, dtype):
-    """Return an element as a value."""
+    """Return an element as an LLVM value."""
     return w.number(element, dtype) if is_known(element) else element
 
 

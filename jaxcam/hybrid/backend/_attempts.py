@@ -1,4 +1,4 @@
-"""Compile attempts of the event loop for this machine, and run them."""
+"""Compile the attempted steps of the event loop for this machine, and run them."""
 
 import ctypes
 import logging
@@ -19,7 +19,7 @@ from ._machine import Compiled, compiled
 from ._writer import compiled_or_lacking, Lacking
 
 
-# rounds per call; between calls, Python can be interrupted or show progress
+# rounds per call; between calls, a run can be interrupted and its progress shown
 _PATIENCE = 200_000
 _POINTERS = (ctypes.c_void_p,) * 8
 _ARGUMENTS = (
@@ -35,29 +35,30 @@ _SAID: set[str] = set()
 
 
 class Key(NamedTuple):
-    """The key of a compiled attempt; hashable."""
+    """The hashable key of a compiled attempted step."""
 
     # non-array parts of the system and the plan, with types and positions
     static: tuple
     structure: Any
-    # arrays of the system and the plan that differ between batch elements, and shared
-    # ones
+    # layouts of the arrays of the system and the plan: of those that differ between
+    # batch elements, and of those that are shared
     own: Layout
     shared: Layout
     # pytree of the scalars of the state, and their types
     lane: Any
     dtypes: tuple
-    # function from a record and the following state to a place in the log and a row
+    # function of the record of an attempt and of the state after it, which returns a
+    # place in the log and the numbers of a row
     row: Callable
     width: int
-    # function of `Functions`, plan and state that takes one attempted step
+    # function that takes one attempted step, given `Functions`, the plan and the state
     step: Callable
 
 
 def key_of(
     static, own: Layout, shared: Layout, lane, row, width, step: Callable = iteration
 ) -> Key:
-    """Return the key of an attempt for batch elements of this kind."""
+    """Return the key of an attempt; `lane` is an example of the state of an element."""
     leaves, structure = jax.tree.flatten(static)
     scalars, lane_structure = jax.tree.flatten(lane)
     # 1, 1.0 and True compare equal but need different programs
@@ -122,7 +123,7 @@ class Attempts:
 
     def __init__(self, key: Key):
         program = traced(key)
-        # the program itself takes megabytes
+        # only its sizes are kept, because the program itself takes megabytes
         self.sizes = sizes_of(program)
         self.width = key.width
         text = str(module_of(program, key.width))
@@ -141,10 +142,11 @@ class Attempts:
     ) -> int:
         """Run batch elements to the end, or to `limit` attempts each.
 
-        **Arguments:** values of system and plan, `(k,)` and `(elements, k)`; values of
-        the states, `(elements, k)`, which are changed in place; the log,
-        `(elements, places, k)`, which begins with place `first`; and a callback
-        between calls.
+        **Arguments:** the values of system and plan: those that are `shared`, `(k,)`,
+        and each element's `own`, `(elements, k)`; the states (`lanes`), `(elements,
+        k)`, which are changed in place; the log (`table`), `(elements, places, k)`,
+        which begins with the place `first`; and a function that is called `between`
+        calls of the compiled loop.
 
         **Returns:** the number of attempts in each slot.
         """
@@ -170,7 +172,7 @@ _KNOWN = Cache()
 
 
 def attempts_of(key: Key) -> Attempts:
-    """Return the loop for a key, compiled once.
+    """Return the loop for a key; it is compiled only once.
 
     **Raises:** `Lacking` if the program needs an operation that the backend does not
     have.
@@ -179,9 +181,9 @@ def attempts_of(key: Key) -> Attempts:
 
 
 def say_lacking(lacking: Lacking, demanded: bool) -> None:
-    """Report once that a system runs with XLA, or raise if that is not allowed.
+    """Report once that a system runs with XLA.
 
-    **Raises:** `ValueError`.
+    **Raises:** `ValueError` instead if LLVM is `demanded`.
     """
     text = (
         "the LLVM backend cannot compile this system, because it does not "

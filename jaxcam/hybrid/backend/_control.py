@@ -24,7 +24,7 @@ _KEPT = 16384
 
 @no_type_check
 def branches(w: Writer, program: Callable, equation, inputs):
-    """Select one of several sides by an index."""
+    """Emit all sides of a branch, and select one of them by an index."""
     which, *arguments = inputs
     sides = equation.params["branches"]
     dtype = equation.invars[0].aval.dtype
@@ -84,7 +84,7 @@ class _Carried:
         ]
 
     def enter(self, before) -> list:
-        """At the head of the loop."""
+        """Create the values at the head of the loop, and return them as arrays."""
         for value in self.first:
             node = self.w.builder.phi(value.type)
             node.add_incoming(value, before)
@@ -108,7 +108,7 @@ class _Carried:
 
 @no_type_check
 def while_loop(w: Writer, program: Callable, equation, inputs):
-    """Repeat until all batch elements have ended; ended ones do not change."""
+    """Emit a loop that runs until all elements have ended; ended ones do not change."""
     params, b = equation.params, w.builder
     first, second = params["cond_nconsts"], params["body_nconsts"]
     of_test, of_body = inputs[:first], inputs[first : first + second]
@@ -136,7 +136,7 @@ def while_loop(w: Writer, program: Callable, equation, inputs):
 
 @no_type_check
 def scan(w: Writer, program: Callable, size: Callable, equation, inputs):
-    """Repeat a known number of times, unrolled if the body is short."""
+    """Emit a loop of a known number of rounds, unrolled if the body is short."""
     params = equation.params
     number, length = params["num_carry"], params["length"]
     fixed, rest = inputs[: params["num_consts"]], inputs[params["num_consts"] :]

@@ -23,7 +23,8 @@ _PATIENCE = 20_000
 class CudaAttempts:
     """The compiled loop of attempts for one key, for the current GPU.
 
-    **Raises:** `ValueError` if there is no GPU or no CuPy; `Lacking`.
+    **Raises:** `ValueError` if there is no GPU or no CuPy; `Lacking` if the program
+    needs an operation that the backend does not have.
     """
 
     def __init__(self, key: Key):
@@ -55,7 +56,7 @@ class CudaAttempts:
         The arguments are those of `Attempts.run`.
         """
         cupy = _cupy()
-        # each thread of Python has to select the GPU, before it asks about the kernel
+        # each Python thread must select the GPU before it asks about the kernel
         cupy.cuda.Device().use()
         states, log = cupy.asarray(lanes), cupy.asarray(table)
         blocks = min(-(-len(lanes) // _BLOCK), self._resident())
@@ -99,9 +100,9 @@ _KNOWN = Cache()
 
 
 def cuda_attempts_of(key: Key) -> CudaAttempts:
-    """Return the loop for a key, compiled once.
+    """Return the loop for a key; it is compiled only once.
 
-    **Raises:** `Lacking`; `ValueError` if there is no GPU or no CuPy.
+    **Raises:** as `CudaAttempts`.
     """
     # a kernel belongs to the GPU for which it was loaded
     one = key, _cupy().cuda.Device().id

@@ -84,7 +84,7 @@ def elementwise(w: Writer, name: str, params, dtype, x):
 
 
 def _of_doubles(w: Writer, name: str, dtype, x):
-    """Wrap a function of 64-bit floats for other types."""
+    """Emit a function of 64-bit floats; other floats are converted before and after."""
     b, kind = w.builder, x[0].type
     narrow = str(dtype) == "float32"
     if narrow:
@@ -225,8 +225,8 @@ def _of_integers(w: Writer, name: str, dtype, x):
 
 @no_type_check
 def _quotient(w: Writer, name: str, signed: bool, x):
-    """Divide integers. Division by zero gives -1, and the dividend as remainder; the
-    smallest number divided by -1 gives itself, and remainder 0.
+    """Divide integers. Division by zero gives the quotient -1, and the dividend as
+    remainder; the smallest number divided by -1 gives itself, and the remainder 0.
     """
     b, (over, under) = w.builder, x
     zero, one, least = w.like(under, 0), w.like(under, 1), w.like(under, -1)

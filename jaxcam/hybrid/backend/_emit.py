@@ -39,7 +39,7 @@ class Emitter:
     def program(self, jaxpr, consts, arguments) -> list[np.ndarray]:
         """Emit a jaxpr and return its results.
 
-        **Raises:** `Lacking` with the name of an operation that cannot be written.
+        **Raises:** `Lacking` with the name of an operation that cannot be emitted.
         """
         values = dict(zip(jaxpr.constvars, map(boxed, consts), strict=True))
         values.update(zip(jaxpr.invars, arguments, strict=True))
@@ -92,7 +92,7 @@ class Emitter:
                 for i in inputs
             ]
             out = np.empty(output.shape, dtype=object)
-            # types of the operands, without the selector
+            # type of the operands, not of the selector
             dtype = dtypes[1] if name == "select_n" else dtypes[0]
             out.ravel()[:] = [
                 self._scalar(name, params, dtype, dtypes, scalars)
@@ -134,7 +134,7 @@ class Emitter:
 
 
 def boxed(array) -> np.ndarray:
-    """Return an array of known numbers, element by element."""
+    """Return known numbers as a numpy array of objects."""
     array = np.asarray(array)
     out = np.empty(array.shape, dtype=object)
     for index in np.ndindex(array.shape):

@@ -2,10 +2,10 @@
 
 The values of the active batch elements are in slots, with one row per value and one
 column per slot. Each round loads them, performs one attempt and stores the results.
-Rare operations (writing a row of the log, the end of a batch element) are done slot by
-slot in separate loops. On a CPU, one call works on all slots, as many as fit into a
-register. On a GPU, each thread works on one slot, and all threads take batch elements
-from one queue.
+Rare operations (writing a row of the log, replacing an ended batch element) are done
+slot by slot in separate loops. On a CPU, one call works on all slots; there are as many
+slots as a register holds values. On a GPU, each thread works on one slot, and all
+threads take batch elements from one queue.
 """
 
 import contextlib
@@ -35,8 +35,9 @@ _FLOAT = np.dtype(np.float64)
 class Program(NamedTuple):
     """One attempt: a jaxpr whose inputs are shared values, own values and the state.
 
-    The first two are arrays, the others scalars. The results are the scalars of the new
-    state, the index of a row of the log (negative if there is none), and that row.
+    The first two are arrays, the state is given as scalars. The results are the scalars
+    of the new state, the index of a row of the log (negative if there is none), and
+    that row.
     """
 
     jaxpr: Any
@@ -171,7 +172,7 @@ class _Kernel:
         self.b.store(value, self.b.gep(pointer, [place]))
 
     def _count(self, which: int, number):
-        """Add to a counter; return what it was before."""
+        """Add to a counter, and return its previous value."""
         place = self.b.gep(self.a.counters, [self._int(which)])
         return self.b.atomic_rmw("add", place, number, "monotonic")
 
@@ -192,7 +193,7 @@ class _Kernel:
         b.position_at_end(after)
 
     def _column(self, row):
-        """Return the address of a row of the slots of this call, a vector."""
+        """Return the address of one row of the slots of this call, as a vector."""
         place = self.b.gep(self.a.slots, [self._slot(self._int(row), self._int(0))])
         return self.b.bitcast(place, self.w.vector(DOUBLE).as_pointer())
 
@@ -211,8 +212,8 @@ class _Kernel:
         return self.b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
     def _copy(self, numbers: int, source, place, target, to) -> None:
-        """Emit a loop that copies values; `place` and `to` map the count to
-        addresses.
+        """Emit a loop that copies values; `place` and `to` map the index of a value to
+        its places in `source` and `target`.
         """
         if not numbers:
             return

@@ -8,7 +8,7 @@ import numpy as np
 from ._writer import kind_of, Lacking
 
 
-# each number is read by an instruction of its own
+# maximum number of values: each is read by an instruction of its own
 _MOST = 4096
 
 
@@ -42,7 +42,10 @@ class Layout(NamedTuple):
 
 
 def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
-    """Return the arrays of a pytree as 64-bit floats: `(size,)`, or `(elements, size)`.
+    """Return the arrays of a pytree as 64-bit floats, and their layout.
+
+    The floats have shape `(size,)`; or, if the arrays have one row for each of `lanes`
+    batch elements, `(elements, size)`.
 
     **Raises:** `Lacking` if an element is not a number, or if there are too many.
     """
@@ -50,7 +53,7 @@ def laid_out(tree, lanes: int | None = None) -> tuple[np.ndarray, Layout]:
     rows, shapes, dtypes = [], [], []
     number, head = (1, 0) if lanes is None else (lanes, 1)
     for array in leaves:
-        # a random key is also an array
+        # raises an error for a random key, which is also an array
         kind_of(array.dtype)
         leaf = np.asarray(array)
         floats = leaf.astype(np.float64)

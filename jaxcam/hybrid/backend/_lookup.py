@@ -21,8 +21,8 @@ def looked_up_in_memory(w: Writer, equation, array, starts, dtypes) -> np.ndarra
     """Emit the slice of an array that starts at unknown indices.
 
     **Arguments:** the equation, a dynamic slice or a gather of one slice; the elements
-    of the array; the indices, one for each dimension that they choose; and the types
-    of array and indices.
+    of the array; the start indices, one for each indexed dimension; and the types of
+    array and indices.
     """
     slicing = _slicing(equation, array.shape)
     zero = ir.Constant(INT64, 0)
@@ -61,10 +61,10 @@ def looked_up_in_memory(w: Writer, equation, array, starts, dtypes) -> np.ndarra
 
 class _Slicing(NamedTuple):
     sizes: tuple[int, ...]
-    # dimensions that the indices choose, and those that the result lacks
+    # indexed dimensions, and those that the result lacks
     axes: tuple[int, ...]
     collapsed: tuple[int, ...]
-    # value outside the array; `None` for the nearest slice instead
+    # value outside the array; `None` if the nearest slice is used instead
     fill: Any
 
 
@@ -82,7 +82,7 @@ def _slicing(equation, shape) -> _Slicing:
 
 
 def fill_of(equation):
-    """Return the value of a gather outside the array."""
+    """Return the value that a gather gives outside the array."""
     dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
     if value is None:
         inexact = np.issubdtype(dtype, np.inexact)
@@ -92,8 +92,8 @@ def fill_of(equation):
 
 @no_type_check
 def _place_of(w: Writer, elements, dtype) -> Place:
-    """Return where the elements are in memory; they are stored there if they are
-    computed.
+    """Return where the elements are in memory; computed elements are stored there
+    first.
     """
     if all(map(is_known, elements)):
         return Place(_constant(w, elements, dtype), 0)
@@ -137,7 +137,7 @@ def _stored(w: Writer, elements, dtype) -> Place:
 
 @no_type_check
 def _loaded(w: Writer, place: Place, flat, dtype):
-    """Load the element number `flat`, for each batch element its own."""
+    """Load the element at index `flat`, which may differ between batch elements."""
     b, shared = w.builder, place.stride is None
 
     def of(index, lane: int):

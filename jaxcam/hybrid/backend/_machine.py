@@ -16,7 +16,7 @@ import llvmlite
 import llvmlite.binding as llvm
 
 
-# as in XLA, the order of operations is not changed
+# optimisation level; as in XLA, the order of operations is not changed
 _LEVEL = 2
 
 
@@ -120,7 +120,7 @@ def user_cache() -> Path:
 
 
 def _folder() -> Path | None:
-    """Return the folder of compiled code: next to that of XLA, if it has one."""
+    """Return the folder of compiled code, inside JAX's cache folder if one is set."""
     given = jax.config.jax_compilation_cache_dir  # pyright: ignore
     try:
         folder = Path(given) if given else user_cache() / "jaxcam" / "compiled"

@@ -108,7 +108,7 @@ class Mapped:
         if not count:
             return np.empty((0, self.results))
         whole = -(-count // self.width) * self.width
-        # padded with the last element: a function may be undefined at zero
+        # padded with the last element, because a function may be undefined at zero
         rows = np.minimum(np.arange(whole), count - 1)
         columns = np.ascontiguousarray(np.asarray(own, dtype=float)[rows].T)
         shared = np.ascontiguousarray(shared, dtype=float)

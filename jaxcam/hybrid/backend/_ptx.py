@@ -11,7 +11,7 @@ from ._writer import INT32, INT64, Writer
 
 
 _TRIPLE = "nvptx64-nvidia-cuda"
-# the functions of the C library are called as in libdevice, NVIDIA's library of
+# prefix of the functions of the C library in libdevice, NVIDIA's library of
 # mathematical functions
 _PREFIX = "__nv_"
 _DECLARED = re.compile(r'^declare double @"(\w+)"\(', re.MULTILINE)

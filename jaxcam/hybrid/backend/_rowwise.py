@@ -16,7 +16,7 @@ from ._mapped import Mapped
 from ._writer import compiled_or_lacking, Lacking
 
 
-# maximum number of results of a row: each is written as separate instructions
+# maximum number of results of a row: each is written by separate instructions
 _MOST = 1024
 
 
@@ -30,8 +30,8 @@ class _Compiled(NamedTuple):
 class Rowwise:
     """A function of shared values and of one row, for rows that are not traced.
 
-    It is compiled once for each kind of arguments: by LLVM, in a small part of the time
-    that XLA takes; or by XLA if LLVM is not wanted or lacks an operation.
+    It is compiled once for each kind of arguments: by LLVM, in a small fraction of the
+    time that XLA takes; or by XLA if LLVM is not wanted or lacks an operation.
 
     **Arguments:** `function(shared, row)` of pytrees, which returns a pytree; and the
     number of rows that are computed at once, by default as many as fit into a register.
@@ -47,8 +47,8 @@ class Rowwise:
     def __call__(self, shared, rows, count: int, *, compiles: bool):
         """Return the results for `count` rows.
 
-        **Arguments:** a pytree; a pytree of arrays with `count` rows; their number; and
-        whether LLVM `compiles` the function, if it can.
+        **Arguments:** the `shared` values, a pytree; the `rows`, a pytree of arrays;
+        their number; and whether LLVM `compiles` the function, if it can.
 
         Returns:
             The result, a pytree of NumPy arrays with `count` rows.

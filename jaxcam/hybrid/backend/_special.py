@@ -183,7 +183,7 @@ def _write_remainder(writer: Writer, name: str, kind):
     x, y = function.args
     size, step = w.call("llvm.fabs", [x]), w.call("llvm.fabs", [y])
     ratio = w.call("llvm.trunc", [builder.fdiv(size, step)])
-    # product and difference are exact: up to 2^53 steps the remainder is a float
+    # product and difference are exact: up to 2^53 steps, a float holds the remainder
     rest = w.call("llvm.fma", [builder.fneg(ratio), step, size])
     rest = a.choose(a.less(rest, 0.0), builder.fadd(rest, step), rest)
     rest = a.choose(a.less(size, step), size, rest)

@@ -29,7 +29,7 @@ _KINDS = {
 
 
 class Lacking(Exception):
-    """The name of an operation that a program needs and this backend does not have."""
+    """Raised for an operation that this backend does not have, with its name."""
 
 
 @functools.cache
@@ -41,10 +41,10 @@ def kind_of(dtype) -> Any:
 
 
 def compiled_or_lacking(cache: Cache, key, make: Callable):
-    """Return what is compiled once for a key.
+    """Return what `make` compiles for a key; it is compiled only once.
 
-    **Raises:** `Lacking`, also if tracing or compiling fails otherwise: XLA then runs
-    the program, or reports the error in it.
+    **Raises:** `Lacking`, even if tracing or compiling fails for another reason: XLA
+    then runs the program, or reports the error in it.
     """
 
     def attempt():
@@ -73,8 +73,8 @@ class Place(NamedTuple):
 
     pointer: Any
     index: int
-    # distance of two rows, and first batch element; `None` if the array is shared by
-    # all batch elements
+    # distance between two rows, and first batch element; `None` if the array is shared
+    # by all batch elements
     stride: Any = None
     first: Any = None
 
@@ -144,7 +144,7 @@ class Writer:
         return kind
 
     def call(self, name: str, arguments, result=None, suffixes=None):
-        """Call an intrinsic function of LLVM, named by the type of its operand."""
+        """Call an LLVM intrinsic, whose full name ends with the type of its operand."""
         result = arguments[0].type if result is None else result
         full = name + "".join(
             "." + _suffix(kind) for kind in (suffixes or [arguments[0].type])
@@ -166,7 +166,7 @@ class Writer:
         return self.builder.icmp_unsigned("!=", set_bits, ir.Constant(bits, 0))
 
     def both(self, a, b):
-        """Return where both flags are set; `None` stands for all."""
+        """Return where both flags are set; `None` stands for all batch elements."""
         if a is None or b is None:
             return b if a is None else a
         return self.builder.and_(*self.alike([a, b]))

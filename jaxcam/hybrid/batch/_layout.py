@@ -1,8 +1,8 @@
 """Store many batch elements as one matrix, and compile the loop that works on it.
 
 Each chunk is one dispatch with few arrays. Passing a whole system and all leaves of a
-batch element instead would take four times as long: as long as 64 elements need for a
-chunk.
+batch element instead would make a dispatch four times as slow: as slow as the
+computation of a chunk for 64 elements.
 """
 
 import functools
@@ -25,7 +25,7 @@ _AT_ONCE = 16
 
 
 class LaneLayout(NamedTuple):
-    """The matrix rows that hold each number of a batch element, and their types."""
+    """The matrix row that holds each number of a batch element, and its type."""
 
     rows: Any
     dtypes: tuple
@@ -94,10 +94,9 @@ class LaneStart(NamedTuple):
     slots: LaneLayout
     numbers: np.ndarray
     own: Any
-    """Parts of the system and the plan that differ between batch elements, and shared
-    parts.
-    """
+    """Parts of the system and the plan that differ between batch elements."""
     shared: Any
+    """Arrays of the system and the plan that all batch elements share."""
     static: Any
 
 
@@ -110,7 +109,7 @@ def start_lanes(
 ) -> LaneStart:
     """Return the start of the batch elements, of which `width` will run at a time.
 
-    `first_of` returns the first states of a run with derivatives.
+    If it is given, `first_of` computes the first states, with derivatives.
     """
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
@@ -141,13 +140,13 @@ def start_lanes(
 def compiled_chunk(
     start: LaneStart, own: Packed, shared: Packed, rows: int, row: Callable
 ):
-    """Return the compiled loop, a function of own and shared parts (each as numbers and
-    separate leaves) and of the numbers of the batch elements, which returns numbers and
-    log.
+    """Return the compiled loop.
 
-    It makes `rows` attempts in each slot, in whole blocks. `row` is that of a `Table`.
-    The log has one array `(rows, slots)` for each number in a row; the first contains
-    the places plus one, and is zero where nothing was done.
+    It is a function of own parts, of shared parts (each as numbers and separate leaves)
+    and of the numbers of the batch elements; it returns their new numbers and the log.
+    A call makes `rows` attempts in each slot, rounded up to whole blocks. `row` is that
+    of a `Table`. The log has one array `(rows, slots)` for each number in a row; the
+    first array contains the places plus one, and zero where no place is written.
     """
     leaves, structure = jax.tree.flatten(start.static)
     # 1, 1.0 and True compare equal but need different programs

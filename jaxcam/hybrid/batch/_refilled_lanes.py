@@ -101,8 +101,8 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
     chunk = compiled_chunk(start, packed_own, packed_shared, rows, table.row)
     place = start.slots.rows
     ends = np.zeros((count, 3), dtype=int)
-    # spread evenly, to estimate the cost of the others; positions without a batch
-    # element of their own hold the last one and are not run
+    # the first batch elements are spread evenly, to predict the cost of the others;
+    # positions without an element of their own hold the last one and are not run
     first = np.linspace(0, count - 1, min(width, count)).astype(int)
     work, used = np.full(width, count - 1), np.zeros(width)
     work[: len(first)], running = first, np.arange(width) < count
@@ -121,7 +121,7 @@ def _by_xla(start: LaneStart, chunking: Chunking, table: Table):
         numbers = np.array(numbers)
         counted = [place.status, place.impacts, place.steps]
         ends[work[over]] = numbers[counted].T[over]
-        # a batch element that has used up its attempts does not change
+        # an element that has used up its attempts is marked, so that it does not change
         numbers[place.status, over], running[over] = FINISHED, False
         if not sorted_yet:
             waiting = costly_first(waiting, work, used, numbers[place.stops])
@@ -140,7 +140,7 @@ def costly_first(waiting, work, used, stops):
 
     An element that needs many attempts and starts last leaves the other positions idle.
     Neighbouring elements have similar costs, so the attempts per period of those that
-    are running predict them.
+    are running predict the costs of the others.
     """
     order = np.argsort(work, kind="stable")
     each = used[order] / np.maximum(stops[order], 0.5)

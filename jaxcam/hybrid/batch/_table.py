@@ -8,10 +8,10 @@ import numpy as np
 class Table:
     """Rows by batch element and place; NaN where nothing has been written.
 
-    **Arguments:** `row(record, state)`, which returns the place (negative for none) and
-    the numbers of the row for an attempt and the state after it; the numbers of batch
-    elements, places and columns; and the `first` place. A later row replaces an earlier
-    one at the same place.
+    **Arguments:** `row(record, state)`, which takes the record of an attempt and the
+    state after it, and returns the place (negative for none) and the values of the row;
+    the numbers of batch elements, places and columns; and the `first` place. A later
+    row replaces an earlier one at the same place.
     """
 
     def __init__(

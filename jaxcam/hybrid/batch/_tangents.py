@@ -16,7 +16,7 @@ from ._table import Table
 # a tangent vector that shrinks to this fraction in one attempt has vanished: what is
 # left of it is rounding
 _GONE = 1e-14
-# batch elements at a time, for the start
+# number of batch elements whose starts are computed at a time
 _WIDTH = 128
 
 
@@ -42,7 +42,7 @@ class Varying(NamedTuple):
 class TangentState(NamedTuple):
     """The loop state, the tangent vectors, and the logarithms of their growth.
 
-    The states of the tangent vectors are orthonormal.
+    The parts of the tangent vectors that belong to the state `x` are orthonormal.
     """
 
     state: LoopState
@@ -73,8 +73,8 @@ class TangentState(NamedTuple):
 def tangent_iteration(functions: Functions, plan: Plan, carried: TangentState):
     """Take one attempted step, with its derivative.
 
-    The frame is orthonormalised after each attempt by triangular factors, whose product
-    is that of the whole motion.
+    The frame is orthonormalised after each attempt; the product of the triangular
+    factors of all attempts is the factor of the whole motion.
     """
 
     def attempt(varying: Varying):
@@ -104,8 +104,8 @@ def tangent_iteration(functions: Functions, plan: Plan, carried: TangentState):
 def _at_one_time(
     functions, state: LoopState, rates, delay, tangent: Varying
 ) -> Varying:
-    """Return a tangent vector between motions at the same time, if the event at the end
-    of the attempt has a `delay`.
+    """Return the tangent vector between motions at the same time, from the `tangent`
+    between motions whose attempts end at times that differ by the `delay`.
     """
     x = [d - rate * delay for d, rate in zip(tangent.x, rates, strict=True)]
     # the rate of the jerk is not known; no derivative of an event depends on it
@@ -118,7 +118,7 @@ def _at_one_time(
         )
         for d, jet in zip(tangent.jets, state.jets, strict=True)
     ]
-    # a step that ends at an event
+    # the next step, if it ends at an event, is longer by the delay
     fixed = state.completing | state.locating
     step = tangent.step + jnp.where(fixed, delay, 0.0)
     moved = Varying(tuple(x), tuple(jets), step)
@@ -130,7 +130,7 @@ def _at_one_time(
 
 
 def _orthonormal(columns: list[Varying]):
-    """Orthonormalise columns by their states; return also their lengths."""
+    """Return columns orthonormalised with respect to the state, and their lengths."""
     done, lengths = [], []
     for column in columns:
         before = _product(column, column)

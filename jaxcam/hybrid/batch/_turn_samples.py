@@ -19,8 +19,8 @@ class TurnSamples:
         return self.table.numbers[:, 1:, 2:]
 
     def counts(self):
-        """Count impacts and completed chatters in each period; 0 where an element
-        failed.
+        """Return the numbers of impacts and completed chatter sequences in each period;
+        0 where an element failed.
         """
         so_far = np.nan_to_num(self.table.numbers[..., :2]).astype(int)
         each = np.maximum(np.diff(so_far, axis=1), 0)
@@ -28,6 +28,8 @@ class TurnSamples:
 
 
 def _row(record, lane):
-    """Return stop number, impacts and completed chatters so far, and the state."""
+    """Return the stop number, the numbers of impacts and of completed chatter sequences
+    so far, and the state.
+    """
     stop = jnp.where(record.kind == float(RowKind.STOP), lane.stops, -1.0)
     return stop, [lane.impacts, lane.chatters, *record.after]

@@ -25,8 +25,8 @@ from ._select import any_of, select
 
 # consecutive attempts without progress in time after which a run gives up
 _PATIENCE = 80
-# part of one of these attempts for which an impact counts that loses energy: bodies
-# come to rest after many of them
+# weight of an impact that loses energy among these attempts: bodies come to rest after
+# many such impacts
 _IMPACT_WEIGHT = 1 / 16
 # impacts on two constraints within this fraction of the longest allowed step accumulate
 _TOGETHER = 1e-3
@@ -54,16 +54,16 @@ class Plan(NamedTuple):
     breaks: tuple
     repeat: Any
     tolerance: Any
-    # absolute error allowed in each component; None: follows from the scale of the
-    # motion
+    # absolute error allowed in each component; `None` if it follows from the scale of
+    # the motion
     absolute: Any
     smallness: Any
     depth: Any
     tableau: Tableau
     # whether to omit the compiler passes that make the loop fast
     plain: bool
-    # whether a step ends exactly at a release, which only derivatives need: the state
-    # follows from a series over the short remaining time
+    # whether a step ends exactly at a release, which only derivatives need; otherwise,
+    # the state there follows from a series over the short remaining time
     exact_release: bool
 
     @staticmethod
@@ -130,8 +130,9 @@ class Attempt(NamedTuple):
     effort: Any
     # change of each component in the step, whether accepted or not
     tried: tuple
-    # whether the step is accepted; if not: is the error small enough, are all numbers
-    # finite, is Newton's method on the surface still converging, and a better length
+    # whether the step is accepted; if not: whether its error is small enough, whether
+    # all numbers are finite, whether Newton's method on the surface is still
+    # converging, and a better length
     good: Any
     fits: Any
     finite: Any
@@ -142,20 +143,21 @@ class Attempt(NamedTuple):
     lands: Any
     # which constraint was hit, or surface crossed
     hit: list
-    # the Poincaré section is crossed
+    # whether the Poincaré section is crossed, if the system has one
     points: tuple
-    # a constraint is hit; or the motion cannot leave the surface that it has reached
+    # whether a constraint is hit; whether the motion cannot leave the surface that it
+    # has reached
     strikes: Any
     stuck: Any
-    # friction makes a contact force ambiguous at the end of the step
+    # whether friction makes a contact force ambiguous at the end of the step
     jams: Any
     # as in `LoopState`
     stale: tuple
-    # a flight hidden by rounding; whether an impact loses energy
+    # whether rounding hides a flight; whether an impact loses energy
     hidden: Any
     loses: Any
     begins: Any
-    # a release is near: the step is repeated so that it ends there
+    # whether a release is near, so that the step is repeated to end there
     locates: Any
     released: Any
     fastest: Any
@@ -227,7 +229,7 @@ def _longest(plan, carried, attempt):
     rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / plan.tableau.order))
     factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
     factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
-    # a much shorter step contains no information about the longest
+    # a much shorter step contains no information about the longest one
     grown = jnp.where(h < 0.5 * carried.longest, carried.longest, h * factor)
     grown = jnp.where(
         h < 0.999 * carried.longest, jnp.maximum(carried.longest, grown), grown
@@ -254,7 +256,7 @@ def _next_length(plan, carried, attempt, longest):
         ends = carried.jets[k], attempt.arrived[k]
         flight = time_to_contact(jet, end_curvature(*ends, inverse))
         held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
-        # a multiplier this close to zero that did not release only touches zero
+        # a multiplier that is this close to zero without a release only touches zero
         held = jnp.maximum(held, CLOSE * longest)
         limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
         ahead = jnp.minimum(ahead, limit)
@@ -273,7 +275,7 @@ def _scale(carried, attempt) -> tuple:
     for k, (s, jet) in enumerate(zip(carried.scale, attempt.jets, strict=True)):
         grows = attempt.good
         if carried.stale and k >= len(carried.held):
-            # its distance is then that of the end of sliding
+            # while the motion slides, the distance is that from the end of sliding
             slides = attempt.mode[len(carried.jets) + k - len(carried.held)]
             grows = grows & ~slides
         larger = jnp.maximum(s, jnp.abs(jet.gap))
@@ -282,7 +284,7 @@ def _scale(carried, attempt) -> tuple:
 
 
 def _struck(carried, attempt):
-    """Return the last impact time of each constraint, and the hidden flights."""
+    """Return the last impact time of each constraint, and a count of hidden flights."""
     if not carried.struck:
         return carried.struck, carried.crowded
     struck = tuple(

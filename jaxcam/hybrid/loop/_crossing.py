@@ -12,12 +12,14 @@ from ._select import any_of, select
 from ._step import Step
 
 
-# distance after a crossing, over the largest so far, that is the error of its location
+# distance just after a crossing, relative to the largest so far, up to which it is the
+# error of the location
 _NEAR = 1e-9
-# fraction of the longest step in which a motion off the surface may return
+# the scale of the distance from a surface is at least the distance that the motion
+# covers in this fraction of the longest step
 _SHORT = 1e-3
-# acceleration off a constraint, relative to that before the motion slid, that is
-# rounding
+# acceleration off a constraint, relative to that before the motion slid, up to which it
+# is rounding
 _ZERO = 1e-11
 
 
@@ -27,7 +29,7 @@ class Sides(NamedTuple):
     # as in `Functions`, one flag for each surface
     negative: tuple
     sliding: tuple
-    # whether sliding along it ends here
+    # for each surface, whether sliding along it ends here
     leaves: list
 
 
@@ -37,15 +39,15 @@ class Passed(NamedTuple):
     jets: list
     # for each surface, whether the motion slides along it from here
     slides: list
-    # whether the motion cannot leave a surface, and cannot slide along it
+    # whether the motion can neither leave a surface nor slide along it
     stuck: Any
-    # whether the sum of a chatter has passed a surface that stops it
+    # whether completing a chatter has moved the state past a surface that stops it
     passed_over: Any
 
 
 def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h, stops):
-    """Let a surface be crossed at once where a jump of the state has crossed it, or
-    where it `stops` the motion.
+    """Return the verdicts, changed so that a surface is crossed at once where a jump of
+    the state has crossed it, or where it `stops` the motion.
     """
     m = len(carried.held)
     for k, behind in enumerate(carried.behind, start=m):
@@ -77,13 +79,13 @@ def stopped_by_impacts(functions: Functions, carried: LoopState) -> list:
 
 
 def _near(carried: LoopState, k: int):
-    """Return the distance from a surface up to which the state is on it."""
+    """Return the distance from a surface up to which the state counts as on it."""
     row = len(carried.held) + k
     return _NEAR * _size(carried, k) + 4 * carried.blur[row]
 
 
 def _size(carried: LoopState, k: int):
-    """Return the largest distance of a surface so far, or after a first short step."""
+    """Return the largest distance from a surface so far, or that after a short step."""
     row = len(carried.held) + k
     step = jnp.abs(carried.jets[row].velocity) * carried.longest
     return jnp.maximum(carried.scale[row], _SHORT * step)
@@ -92,10 +94,10 @@ def _size(carried: LoopState, k: int):
 def sides_after(
     functions: Functions, carried: LoopState, made: Step, hit, lands, t, x
 ) -> Sides:
-    """Return the sides after a step to the time `t`, and the state `x` there.
+    """Return the sides after a step to the time `t` and the state `x`.
 
-    A crossing changes the side. Sliding ends on the side of which the weight has
-    reached one; or, after a jump of the state, on the side on which the state is then.
+    A crossing changes the side. Sliding ends on the side whose weight has reached one;
+    or, after a jump of the state, on the side to which the state has jumped.
     """
     negative, sliding = list(carried.negative), list(carried.sliding)
     across = hit[functions.m :]
@@ -134,8 +136,8 @@ def past_surfaces(
     With a hysteresis, the distance is twice the hysteresis; after a reset, it may have
     any value. If the branch beyond the surface points back, the motion slides; the
     field then changes by at most 1 + s times the difference of the branches. `approach`
-    is the (negative) rate at which the motion came, `blur` the rounding errors of the
-    distances, and `stops` is from `stopped_by_impacts`.
+    is the (negative) rate at which the motion reached the surface, `blur` the rounding
+    errors of the distances, and `stops` the result of `stopped_by_impacts`.
     """
     jets, m = list(jets), functions.m
     slides, stuck = [], jnp.asarray(False)
@@ -145,7 +147,7 @@ def past_surfaces(
         jet, behind = jets[m + k], carried.behind[k]
         near = _near(carried, k)
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
-        # a slip that friction stops during the rest of a chatter is summed beyond zero
+        # completing a chatter moves a slip that friction stops meanwhile beyond zero
         summed = jnp.asarray(False)
         if functions.m and k in functions.slidable:
             summed = behind & (carried.stale[0] == COMPLETED)
@@ -164,7 +166,7 @@ def past_surfaces(
         slides.append(on & ((jet.velocity <= most) | stops[k]))
         if functions.m:
             passed_over = passed_over | (slides[k] & summed)
-        # at the limit of the force the motion leaves without a velocity
+        # at the limit of the friction force, the motion leaves with zero velocity
         smooth = left & ~behind & (slack[k] == 0)
         velocity = jnp.where(left, jnp.maximum(jet.velocity, 0.0), jet.velocity)
         jets[m + k] = Jet(
@@ -177,7 +179,7 @@ def past_surfaces(
 
 
 def _seen_again(carried: LoopState, jets) -> LoopState:
-    """Replace the jets of a state whose mode has just changed by those of this mode.
+    """Return a state whose mode has just changed, with the jets of its new mode.
 
     **Arguments:** the state, and the `jets` at the end of a step of length zero.
     """
@@ -198,16 +200,18 @@ def _seen_again(carried: LoopState, jets) -> LoopState:
 
 
 def refreshed(carried: LoopState, made: Step) -> tuple[LoopState, Step]:
-    """Return a state whose mode has just changed, and its step, with fitting jets."""
+    """Return a state whose mode has just changed, and its step, with updated jets."""
     carried = _seen_again(carried, made.jets)
     jets = of_constraints(carried, carried.jets, made.jets)
     return carried, made._replace(jets=jets)
 
 
 def of_constraints(carried: LoopState, old, new) -> list:
-    """Return new jets, but the old ones of constraints in a step of length zero.
+    """Return the new jets, except that constraints keep the old ones after a step of
+    length zero.
 
-    It only evaluates the jets of surfaces again: rounding must not undo a release.
+    Such a step only updates the jets of surfaces, because rounding must not undo a
+    release.
     """
     again, m = carried.stale[0] > 0, len(carried.held)
     kept = zip(old[:m], new[:m], strict=True)

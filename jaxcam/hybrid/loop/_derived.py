@@ -1,4 +1,4 @@
-"""Functions of a system that only the loop needs, of arrays."""
+"""Functions of a system, taking arrays, that only the loop needs."""
 
 import jax
 import jax.numpy as jnp
@@ -18,8 +18,8 @@ from ..surface import (
 
 
 def planar_jet(system, t, x, contact):
-    """Return the free jet; in contact, the rate of the normal acceleration `a` along
-    the sticking motion is `j - C a`, with the jerk `j`.
+    """Return the jet in free flight; in contact, its jerk `j` is replaced by `j - C a`,
+    the rate of the normal acceleration `a` along the sticking motion.
     """
     jet = free_jet(system, t, x)
     direction = normal_directions(system, t, x)[0]
@@ -48,7 +48,7 @@ def nested_series(function, t, x, *rest) -> MotionSeries:
 
 
 def in_mode(function, m: int, jumps: Jumps):
-    """Convert a `function` of a system to one in a given mode, its last argument."""
+    """Convert a `function` of a system to one whose last argument is the mode."""
 
     def call(system, *arguments):
         *rest, mode = arguments

@@ -17,12 +17,12 @@ from ._gap_polynomial import (
 )
 
 
-# an impact is computed by the Taylor series if it lies beyond this fraction of the
-# step: the error of the series is of fourth order in the rest
+# an impact within this fraction of the step from its end is computed by the Taylor
+# series there, whose error is of fourth order
 _CLOSE = 2e-3
-# and if the gap is nearly a straight line there, so that its root is a short series
+# the gap must also be nearly a straight line there, so that its root is a short series
 _STRAIGHT = 4e-3
-# error of the gap polynomial relative to the largest gap up to which it is trusted
+# error of the gap polynomial, relative to the largest gap, up to which it is trusted
 _TRUST = 0.02
 # fraction of the longest step within which a motion off the surface does not return
 _SHORT = 1e-3
@@ -46,9 +46,9 @@ def judge(
     **Arguments:** the jets at both ends, the step length, the negative gap that is
     tolerated, the gap that rounding cannot distinguish from zero, the largest gap so
     far, the time left to the next requested time (an impact beyond it waits for a later
-    step), and the longest step that the error allows. At a Poincaré section, a motion
-    may stay `calm` at a distance that is tolerated: at rest on it, it would cross it by
-    rounding without end.
+    step), and the longest step that the error allows. If `calm`, at a Poincaré section,
+    a motion may stay at a distance that is tolerated; otherwise, rounding would make a
+    motion at rest on the section cross it endlessly.
     """
     polynomial = bernstein(left, right, h)
     inward = moves_in(right, rounding)
@@ -57,14 +57,14 @@ def judge(
     behind = (right.gap < -slack) | ((right.gap < 0) & inward)
     # on the surface at the start of the step and moving or pulled in: no time passes
     now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)
-    # a polynomial whose error is comparable with the gap is uninformative; for a gap
-    # that has been closed so far, the gap itself is rounding
+    # a polynomial whose error is comparable with the gap is uninformative; if the gap
+    # has been closed so far, its value is itself only rounding
     size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
-    # for a power of time starting from rest on the surface, shorter steps do not help
+    # if the gap grows from rest as a power of time, shorter steps do not help
     leaves = (left.gap == 0) & (left.velocity == 0) & (h <= _SHORT * longest)
     leaves = leaves & (right.velocity > 0) & (right.acceleration > 0)
     vague = (polynomial.error > _TRUST * size + rounding) & ~now & ~leaves
-    # based on the straight line, because the series can vanish far from the root
+    # a straight line decides, because the series can vanish far from the root
     distance = jnp.abs(right.gap)
     speed = jnp.abs(right.velocity)
     straight = distance * jnp.abs(right.acceleration) <= _STRAIGHT * speed * speed

@@ -29,6 +29,6 @@ def frame_of(system, t, x):
 
 
 def lift_of(system, t, x):
-    """Return, by gap, the displacement of the state that increases it by one."""
+    """Return, for each gap, the displacement of the state that increases it by one."""
     gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
     return gradient / jnp.sum(gradient * gradient, axis=1)[:, None]

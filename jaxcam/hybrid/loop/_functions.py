@@ -19,15 +19,15 @@ class Functions:
     """Functions of `(t, x)` with `x` a tuple of scalars and the parameters bound.
 
     The discrete `mode` is a tuple of flags: whether each of the `m` constraints is in
-    contact, then whether the motion is, or came from, on the negative side of each of
-    the `k` switching surfaces, then whether it slides on each. Without surfaces, most
-    functions do not depend on it.
+    contact, then whether the motion is on the negative side of each of the `k`
+    switching surfaces (or, if it slides, came from there), then whether it slides on
+    each. Without surfaces, most functions do not depend on the mode.
 
     `planar` systems have two states, one constraint and no surface: gap and normal
     velocity determine the state during contact, which then needs no integration.
     `plain` functions are called unchanged, with arrays. `shared` programs are traced
-    once for all runs of this kind of system, which only runs that are not traced may
-    assume: a new trace of a user sees what has changed since the last one.
+    once for all runs of this kind of system. Only runs that are not traced may use
+    them: each trace by a user must see what has changed since the last one.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Functions:
         self.slidable = found.slidable
         # whether contacts have friction; whether impacts may coincide
         self.rubs, self.joins = found.rubs, found.joins
-        # direction in which crossings of the last surface, a Poincaré section, count
+        # direction in which crossings of a Poincaré section, the last surface, count
         self.counts: int | None = found.counts
         self._parameters = parameters if plain else jax.tree.map(split, parameters)
         self._memory: Memory | None = None
@@ -64,11 +64,11 @@ class Functions:
             self._memory = None
 
     def _side(self, mode) -> tuple:
-        """Return a mode as arguments: none without surfaces."""
+        """Return the mode as an argument, or no argument if there are no surfaces."""
         return (_pack(mode),) if self.k else ()
 
     def _held(self, mode) -> tuple:
-        """Return the mode, or only the contacts without surfaces, as an argument."""
+        """Return the mode as an argument: only the contacts if there is no surface."""
         return (_pack(mode if self.k else mode[: self.m]),)
 
     def field(self, t, x, mode):
@@ -148,8 +148,9 @@ class Functions:
         return tuple(self._call("sides", t, _pack(x))) if self.k else ()
 
     def settled(self, t, x, mode):
-        """Return the state moved onto the surfaces on which it slides; and, for each
-        surface that slides, the change of the field beyond it.
+        """Return the state moved onto the surfaces on which the motion slides; and, for
+        each `slidable` surface, the change of the field beyond it, zero without
+        sliding.
         """
         if not self.slidable:
             return x, []
@@ -157,12 +158,12 @@ class Functions:
         return tuple(rows[0]), [tuple(row) for row in rows[1:]]
 
     def shares(self, t, x, mode) -> tuple:
-        """Return the weights of the branches beyond the surfaces on which it slides."""
+        """Return the weights of the branches beyond the surfaces of sliding."""
         return tuple(self._call("shares", t, _pack(x), *self._side(mode)))
 
     def hold(self, t, x, mode) -> tuple[tuple, tuple]:
-        """Return how far the weights of the branches beyond the surfaces on which it
-        slides are outside their limits, and these weights.
+        """Return how far the weights of the branches beyond the surfaces of sliding are
+        outside their limits, and these weights.
         """
         off, shares = self._call("hold", t, _pack(x), *self._side(mode))
         return tuple(off), tuple(shares)
@@ -197,7 +198,7 @@ class Functions:
         )
 
     def lift(self, t, x, mode):
-        """Return, by gap, the displacement of the state that increases it by one."""
+        """Return, for each gap, the displacement of the state that opens it by one."""
         if not self.m:
             return ()
         return tuple(map(tuple, self._call("lift", t, _pack(x), *self._side(mode))))
@@ -227,14 +228,14 @@ class Functions:
     def joint_rest(self, t, x, touching, mode) -> tuple[tuple, tuple]:
         """Return the state at rest on the `touching` constraints, and all multipliers.
 
-        Only for several constraints.
+        This is available only with several constraints.
         """
         flags = _pack(touching)
         state, found = self._call("joint_rest", t, _pack(x), flags, *self._side(mode))
         return tuple(state), tuple(found)
 
     def compliance(self, t, x, mode):
-        """Return the `least_compliance` of the contacts, only for contact friction."""
+        """Return the `least_compliance` of contacts; available only with friction."""
         return self._call("compliance", t, _pack(x), *self._side(mode))[()]
 
     def onto(self, frame: Frame, jets, x, mode):

@@ -42,7 +42,7 @@ def _scaled(jet: Jet, h) -> tuple:
 
 
 def _remainders(left: tuple, right: tuple) -> tuple:
-    """Return the error of the left parabola at the right end, as for `_scaled`."""
+    """Return the errors of the left parabola at the right end, as for `_scaled`."""
     c0, c1, c2, _ = left
     e0, e1, e2, _ = right
     return e0 - (c0 + c1 + c2), e1 - (c1 + 2 * c2), e2 - c2
@@ -65,7 +65,7 @@ def bernstein(left: Jet, right: Jet, h) -> Bernstein:
 
 
 def _mistrust(left: Jet, right: Jet, h):
-    """Return a bound of the difference from the polynomial of degree five, which
+    """Return a bound on the difference from the polynomial of degree five, which
     ignores j.
 
     The difference is s^3 (1-s)^3 (p + q (2s - 1)); its third-order coefficients at the
@@ -79,7 +79,7 @@ def _mistrust(left: Jet, right: Jet, h):
 
 
 def lowest(polynomial: Bernstein):
-    """Return a lower bound of the gap within the step, minus its error.
+    """Return a lower bound on the gap within the step, minus the interpolation error.
 
     The interpolation error vanishes together with its derivatives up to the third at
     both ends, so it is assigned to the two middle coefficients, with weight 64/35.
@@ -137,7 +137,7 @@ def crossing(c, halvings: int = 3, newtons: int = 2):
 
 
 def lowest_point(polynomial: Bernstein, c):
-    """Estimate the minimum of the polynomial in (0, 1)."""
+    """Return an estimate of where in (0, 1) the polynomial is lowest."""
     b = polynomial.coefficients
     s, best = jnp.full_like(c[0], 1 / 7), b[1]
     for k in range(2, 7):
@@ -212,7 +212,7 @@ def time_to_root(jet: Jet):
     """Return the signed time to the nearby zero of the cubic, if |g a| is small
     compared with v^2.
 
-    It is the series that inverts the cubic, to fourth order in g/v.
+    The time follows from the series that inverts the cubic, to fourth order in g/v.
     """
     g, v, a, j = jet
     inverse = 1.0 / jnp.where(v == 0, 1.0, v)

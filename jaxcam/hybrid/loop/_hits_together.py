@@ -1,4 +1,4 @@
-"""Apply the impacts on several constraints that coincide."""
+"""Apply impacts on several constraints at the same instant."""
 
 from typing import Any, NamedTuple
 
@@ -12,9 +12,9 @@ from ._select import any_of, select
 class Hits(NamedTuple):
     """The state after the impact on one constraint, or on several at once."""
 
-    # whether there are several
+    # whether several constraints are hit
     several: Any
-    # whether the law is that of an impact on several
+    # whether the law is that of an impact on several constraints
     joins: Any
     after: tuple
     # which constraints are hit
@@ -26,13 +26,15 @@ def hits_together(
 ) -> Hits:
     """Return the impact on all constraints that are reached at the same instant.
 
-    Their gaps cannot be distinguished from zero, and they approach. Other closed gaps
-    take part, so that none of them is closed further. With friction, closed gaps take
-    part in every impact, because a body may jam.
+    These are the constraints whose gaps are closing and cannot be distinguished from
+    zero. Other closed gaps take part in such an impact, so that none of them closes
+    further. With friction, closed gaps take part in every impact, because a body may
+    jam.
 
     **Arguments:** which constraint is `hit` first; the `jets` at the end of the step;
-    the time of the impact after it, and as a time (s); the state before the impact; and
-    the state `after` the impact on the first constraint alone.
+    the time from there to the impact (`offset`), and the time `t` of the impact (s);
+    the state `x` before it; and the state `after` the impact on the first constraint
+    alone.
     """
     m, several = functions.m, jnp.asarray(False)
     if not functions.joins:

@@ -53,7 +53,8 @@ class Judged(NamedTuple):
     over: Any
     # the step length that the errors alone would allow
     natural: Any
-    # largest gap that contact has suppressed; resolution of a zero gap there
+    # for each constraint, largest gap that contact has suppressed, and resolution of a
+    # zero gap in contact
     held: list
     tiny: list
     # for each surface, whether sliding begins at once: see `stopped_by_impacts`
@@ -84,7 +85,7 @@ def _iterate(
     landing = land(functions, plan, carried, end, made, *parts)
     chatter, begins = landing.chatter, landing.begins
 
-    # contact: the state is moved onto the surface a second time, then checked
+    # in contact, the state is moved onto the surface a second time, then checked
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
     converged = ~sticking | settles(functions, carried, made, landing, settled)
     held = _judge_contacts(carried, end, landing, judged)
@@ -134,7 +135,7 @@ def _iterate(
         fits=made.effort <= 1.0,
         finite=finite,
         shorter=_shorter(functions, end, judged, held, converged, jam),
-        # algebraic contact can start its next attempt from here
+        # the next attempt to find the state in contact starts from here
         guess=left if functions.planar else carried.x,
         settling=~converged & functions.planar,
         stopped=stopped,
@@ -189,7 +190,8 @@ def _judge_flights(
     slack = [2e-12 * s + b for s, b in zip(carried.sizes, carried.blur, strict=True)]
     free = [~c for c in carried.closed]
     if carried.stale:
-        # over the short rest of a chatter, whose contact may change the end of sliding
+        # surfaces are not checked while a chatter is completed, because the contact
+        # that follows may change the end of sliding
         m = len(carried.held)
         free[m:] = [f & ~carried.completing for f in free[m:]]
     verdicts = [
@@ -214,7 +216,7 @@ def _judge_flights(
         verdicts = jumped_across(carried, verdicts, h, stops)
     flown = earliest(verdicts)
     natural = jnp.minimum(carried.longest, plan.longest_step)
-    # the motion suppressed by the multipliers counts as gap, since rounding is relative
+    # the gap that the multipliers suppress also counts, because rounding is relative
     # to it
     held = [
         jnp.maximum(s, natural * natural * jnp.abs(j.acceleration))
@@ -225,7 +227,7 @@ def _judge_flights(
     active = carried.status == RUNNING
     waits = _waits_for_release(carried, jets, flown, natural, tiny)
     lands = flown.lands & fits & active & ~waits
-    # the step to a release does not end behind the constraint hit after it
+    # the step to a release must not end behind the constraint that is hit after it
     behind = of_constraint([j.gap for j in jets], flown.constraint)
     over = waits & (behind < -of_constraint(slack, flown.constraint))
     good = fits & ~flown.retake & ~over & active
@@ -282,7 +284,7 @@ def _stale(carried, landing: Landing, released) -> tuple:
 
 
 def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
-    """Return the jets of the next step, in which rounding must not undo a contact.
+    """Return the jets for the next step, in which rounding must not undo a contact.
 
     On the surface, the gap is zero; at a release, the velocity is also zero and the
     acceleration is not compressive. A completed chatter continues with the acceleration

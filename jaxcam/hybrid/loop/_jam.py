@@ -20,7 +20,7 @@ _TINY = 1e-12
 class Jam(NamedTuple):
     """The outcome of a step for the compliance of the contacts."""
 
-    # whether it has fallen to zero at the end of the step
+    # whether the compliance has fallen to zero at the end of the step
     near: Any
     # whether the step ends well beyond that, and a better length for it
     retake: Any
@@ -32,7 +32,7 @@ def jam_of_step(
 ) -> Jam:
     """Return whether the contacts lose their compliance in a step.
 
-    The contact force may have a pole there, so its zero is not its release.
+    The contact force may have a pole there, so a change of its sign is not a release.
     """
     h, no = end.length, jnp.asarray(False)
     if not functions.rubs:

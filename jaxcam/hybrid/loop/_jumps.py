@@ -18,11 +18,11 @@ def jumping_components(
 ) -> Jumps:
     """Return, for each surface, the components of the rates that its side changes.
 
-    These are those of the field and, in contact, those that friction changes. They are
-    read from the program of the branches, scalar by scalar. A surface whose
-    switching function depends on none of these components has none: the motion moves
-    towards it at the same speed on either side, so it cannot slide along it. An example
-    is a stop at a position, which changes a force.
+    Without contacts, only the branch changes with the side; in contact, friction also
+    does. The components are read from the programs of both, scalar by scalar. If the
+    switching function of a surface depends on none of them, none is returned for this
+    surface: the motion approaches it at the same speed on either side, so it cannot
+    slide along it. An example is a stop at a position, which changes a force.
 
     Args:
         system: The system; only its structure matters.

@@ -47,8 +47,8 @@ class Landing(NamedTuple):
     loses: Any
     # whether a constraint is hit, not a switching surface crossed
     strikes: Any
-    # whether the motion slides along the surface that it has reached from here, whether
-    # it leaves one along which it slid, and whether it can do neither
+    # whether, from here on, the motion slides along the surface that it has reached,
+    # whether it leaves one along which it slid, and whether it can do neither
     slides: Any
     leaves: Any
     stuck: Any
@@ -147,7 +147,7 @@ def land(
 
 
 class _Ending(NamedTuple):
-    """Whether the impacts after one are completed: see `Landing`."""
+    """Whether and how the impacts after this one are completed: see `Landing`."""
 
     chatter: Rest
     begins: Any
@@ -158,14 +158,14 @@ class _Ending(NamedTuple):
 def _ending(
     functions, plan, carried, end, impact, speeds, jets, mode, hit, fastest, rounding
 ) -> _Ending:
-    """Complete the impacts after one, on its constraint or on several."""
+    """Complete the impacts after this one, on its constraint or on several."""
     if not functions.m:
         return _Ending(no_rest(impact), jnp.asarray(False), [], [])
     chatter = rest_of_chatter(
         functions, plan, impact, speeds, jets, mode, end.stop, rounding
     )
-    # far enough into the sequence, or so low that rounding hides the next flight: its
-    # height is v^2 / 2a, and below 250 times the rounding, it is hidden
+    # the sequence must be advanced enough, or the rebound so slow that rounding hides
+    # the next flight: if its height v^2 / 2a is below 250 times the rounding
     deep = impact.rebound <= plan.depth * fastest
     low = 500 * of_constraint(carried.blur, impact.constraint)
     hides = impact.rebound * impact.rebound <= low * _pull(jets, impact)
@@ -193,7 +193,7 @@ def _kept_contacts(functions, carried, lands, joins, t, before, after):
     """Return the contacts kept after an impact, which may break contact elsewhere.
 
     A contact breaks if the impact changes its normal velocity by more than rounding; if
-    it took part in the impact, relative to the largest change.
+    it took part in the impact, rounding is relative to the largest change.
     """
     mode = carried.mode
     if functions.m <= 1:

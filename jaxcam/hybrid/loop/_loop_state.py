@@ -14,10 +14,10 @@ from ._select import any_of, select
 from ._start import first_sides, first_status
 
 
-# the flag `stale` after the rest of a chatter
+# the flag `stale` after a chatter has been completed
 COMPLETED = 1.5
-# part of the longest step over which a motion that starts on a surface gives its
-# distance a size
+# the first scale of the distance from a surface is at least the distance that the
+# motion covers in this part of the longest step
 _PART = 1e-6
 
 
@@ -33,7 +33,8 @@ class LoopState(NamedTuple):
     # the next step to try, and the longest one that the error allows
     step: Any
     longest: Any
-    # the end of this step is an accumulation point or a release, so its length is fixed
+    # whether this step ends at an accumulation point, or at a release, so that its
+    # length is fixed
     completing: Any
     locating: Any
     stops: Any
@@ -42,8 +43,8 @@ class LoopState(NamedTuple):
     scale: tuple
     # resolution of each gap
     blur: tuple
-    # for each constraint, the largest gap that contact has suppressed: that of the
-    # multiplier over the longest allowed step
+    # for each constraint, the largest gap that contact has suppressed: the gap that the
+    # multiplier would open over the longest allowed step
     held: tuple
     # for several constraints: time of the last impact on each, and number of
     # consecutive impacts whose flights are below rounding
@@ -53,14 +54,14 @@ class LoopState(NamedTuple):
     crossed: tuple
     # for a Poincaré section: number of crossings
     points: tuple
-    # for surfaces along which a motion can slide: the mode has changed since the jets
-    # were computed, and those of surfaces (1) or of constraints as well (2) are old;
-    # `COMPLETED` (surfaces only) after the rest of a chatter
+    # for surfaces along which a motion can slide: positive if the mode has changed
+    # since the jets were computed, so that the jets of surfaces (1), or also those of
+    # constraints (2), are old; `COMPLETED` (only surfaces) after a completed chatter
     stale: tuple
     # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
     extents: tuple
-    # longest allowed step
+    # limits the first steps; it grows with each accepted step
     ramp: Any
     failures: Any
     # a code of `codes.py`
@@ -92,7 +93,7 @@ class LoopState(NamedTuple):
 
     @property
     def sizes(self) -> tuple:
-        """The largest value of each distance; one for that of the end of sliding."""
+        """The largest value of each distance; 1 for that from the end of sliding."""
         if not self.stale:
             return self.scale
         sliding = (jnp.asarray(False),) * len(self.held) + self.sliding
@@ -110,8 +111,8 @@ class LoopState(NamedTuple):
 
 
 def closed(mode: tuple, constraints: int, jets: int) -> tuple:
-    """Return the flags of contact, and False for each switching surface, of all
-    `jets`.
+    """Return a flag for each of the `jets`: whether its constraint is in contact, and
+    False for a switching surface.
     """
     rest = range(jets - constraints)
     return mode[:constraints] + tuple(jnp.asarray(False) for _ in rest)
@@ -214,10 +215,11 @@ def first_state(
 
 
 def _first_scale(jets, m: int, longest) -> tuple:
-    """Return the first sizes of the gaps, and of the distances of surfaces.
+    """Return the first scales of the gaps, and of the distances from surfaces.
 
-    A distance that is zero from the start, as of a body that sticks, still has a size:
-    that of a motion off the surface over a small part of the longest step.
+    A distance that is zero at the start, such as that of a body that sticks, still has
+    a scale: the distance that the motion off the surface covers in a small part of the
+    longest step.
     """
     moves = [jnp.abs(j.velocity) * longest * _PART for j in jets[m:]]
     sizes = [jnp.abs(jet.gap) for jet in jets]

@@ -51,7 +51,7 @@ from ._frame import frame_of, lift_of
 from ._jumps import jumping_components
 
 
-# highest derivatives that a step uses, of each part of `Distances`
+# for each part of `Distances`, the highest derivative that a step uses
 _ORDERS = (3, 1, 3, 0)
 # largest number of kinds of systems whose programs are kept
 _MOST = 128
@@ -99,7 +99,7 @@ class Programs:
 
     @property
     def portable(self) -> bool:
-        """Whether they contain nothing of the trace in which they were made."""
+        """Whether the programs contain nothing of the trace in which they were made."""
         made = self.by_name.values()
         return not self._plain and all(one.portable for one in made)  # pyright: ignore
 
@@ -178,7 +178,7 @@ def _unchanged(whole, series: bool, parameters, *arguments, memory=None):
 
 
 class _Kind(NamedTuple):
-    """What the programs of a system depend on."""
+    """Everything on which the programs of a system depend."""
 
     # parts that are not parameters, with their types: 1, 1.0 and True compare equal
     leaves: tuple
@@ -217,5 +217,5 @@ def programs_of(static, parameters, n: int, *, plain: bool, shared: bool) -> Pro
     try:
         return _KNOWN.get(kind, make, lambda made: made.portable)
     except TypeError:
-        # not hashable: an array of integers, for example
+        # a part is not hashable, for example an array of integers
         return make()

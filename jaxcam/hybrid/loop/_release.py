@@ -6,9 +6,9 @@ from ._flight import StepVerdict
 from ._gap_polynomial import end_curvature, Jet
 
 
-# a release is located by repeating the step until the rest is this fraction of the
-# step length that the error estimate alone allows; over it, the multiplier is a
-# parabola
+# to locate a release, the step is repeated until its end is this close to the release,
+# as a fraction of the step length that the error estimate alone allows; over the
+# remaining time, the multiplier is a parabola
 CLOSE = 1e-7
 
 
@@ -44,8 +44,8 @@ def judge_contact(
     near = rises & pulls & (jnp.abs(offset) <= CLOSE * scale)
     # the zero of a multiplier whose rates also vanish there can only be bracketed
     enclosed = passed & (h <= CLOSE * scale)
-    # a multiplier that only touches zero: no flight would exceed rounding. Its rate
-    # decreases by at least half, which rounding cannot cause over a short step
+    # whether the multiplier only touches zero, so that no flight would exceed rounding:
+    # its rate decreases by at least half, which rounding cannot cause in a short step
     falls = (left.jerk > 0) & (2 * right.jerk <= left.jerk) & (h > 0)
     curved = jnp.where(falls, (left.jerk - right.jerk) * inverse, 1.0)
     peak = a1 + right.jerk**2 / (2 * curved)

@@ -52,7 +52,7 @@ def rest_of_chatter(
     for k in range(1, functions.m):
         state = select(constraint == k, states[k], state)
     if functions.rubs and functions.joins:
-        # the ratio and the direction of an impact on all closed gaps
+        # coefficient and direction, if the impact is one on all closed gaps
         change = jnp.where(joins & (rebound > approach), rebound - approach, 1.0)
         ratio = rebound / jnp.where(joins & (approach < 0), -approach, 1.0)
         r0 = jnp.where(joins, ratio, r0)
@@ -85,7 +85,7 @@ def rest_of_chatter(
         left = jet.gap + duration * (jet.velocity + duration * strongest / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
         if k < functions.m:
-            # a body that leaves, and still does so at the end
+            # a body that leaves the constraint, and is still leaving it at the end
             rises = jet.velocity + duration * strongest > 0
             clear = clear | (rises & (jet.gap >= -rounding[k]))
         else:
@@ -96,6 +96,6 @@ def rest_of_chatter(
 
 
 def no_rest(impact: Impact) -> Rest:
-    """Return that no chatter follows, for a system without constraints."""
+    """Return the result for a system without constraints: no chatter follows."""
     zero = jnp.zeros_like(impact.t)
     return Rest(jnp.asarray(False), zero, impact.after, zero, zero)

@@ -1,7 +1,8 @@
 """Complete impacts that accumulate on several constraints at once.
 
-Such a sequence has no closed form: the order of the impacts may never repeat. They are
-followed until their flights are negligible, and then all of these constraints close.
+Such a sequence has no closed form: the order of the impacts may never repeat. The
+impacts are followed until the flights between them are negligible; then, all of these
+constraints close.
 """
 
 from typing import Any, NamedTuple
@@ -57,7 +58,7 @@ def loses_energy(impact: Impact):
 
 
 def _ends(jet, pull, short, slow, rounding):
-    """Return whether a gap remains closed but for flights that are negligible.
+    """Return whether a gap remains closed except for negligible flights.
 
     **Arguments:** the acceleration `pull` (positive) towards the constraint, and the
     squares of a negligible time and of a negligible velocity.

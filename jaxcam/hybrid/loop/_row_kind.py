@@ -30,8 +30,8 @@ def kind_of_switch(carried, landing: Landing, lands, kind):
 def at_section(functions, carried, landing: Landing, lands) -> tuple:
     """Return whether an attempt ends at the Poincaré section, if there is one.
 
-    A crossing in no time is not one of the flow: a jump of the state has crossed the
-    section, or a contact that held the motion on it has ended.
+    A crossing after a step of length zero is not a crossing by the flow: a jump of the
+    state has crossed the section, or a contact that held the motion on it has ended.
     """
     if functions.counts is None:
         return ()

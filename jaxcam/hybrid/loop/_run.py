@@ -22,7 +22,7 @@ _BLOCK = 16
 
 
 class Log(NamedTuple):
-    """One row per iteration; rows of kind `Row.NOTHING` are failed attempts."""
+    """One row per iteration; rows of kind `RowKind.NOTHING` are failed attempts."""
 
     kind: Float[Array, " rows"]
     constraint: Float[Array, " rows"]
@@ -62,7 +62,7 @@ def run_raw(
 ):
     """Run the loop and log the scalars `row(record, state)` of each attempt.
 
-    It is compiled for `company` batch elements.
+    `company` tells for how many batch elements the loop is compiled.
     """
     carried = jax.tree.map(jnp.asarray, carried)
 
@@ -70,8 +70,8 @@ def run_raw(
         carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(row(record, carried))
 
-    # scalars of a single run are never computed twice; keeping them takes compilation
-    # time
+    # scalars of a single run are never computed twice; keeping them would only take
+    # compilation time
     alone = company == "one"
     keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
     width = len(row(_empty_record(carried), carried))
@@ -88,7 +88,7 @@ def run_raw(
         return count + 1, state, jax.lax.dynamic_update_slice(log, some, start)
 
     def loop(state):
-        # allocated here: the kernel keeps its arguments
+        # allocated here, because the kernel keeps its arguments in memory
         log = jnp.zeros((blocks * _BLOCK, width))
         start = (jnp.asarray(0, jnp.int32), state, log)
         _, last, log = jax.lax.while_loop(unfinished, several, start)
@@ -122,8 +122,9 @@ def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
 def run_many(some: Callable, lanes: LoopState, rows: int, row):
     """Iterate until no batch element is running or the log is full.
 
-    **Arguments:** `some(lanes)`, the `attempts` of all batch elements, which are last
-    in the log; the elements, `(elements,)` each; the rows of the log, and `row`.
+    **Arguments:** `some(lanes)`, which runs `attempts` for all batch elements and
+    returns them and the log, in which their axis is last; the batch elements,
+    `(elements,)` each; the number of rows of the log; and `row`.
 
     Returns:
         The batch elements and the log, `(rows, elements)` for each number in a row.

@@ -12,8 +12,9 @@ from ._select import largest
 
 # an error below this fraction of a component's scale is rounding
 _ROUNDING = 1e-15
-# allowed error divided by the tolerance times the scale of the motion: a state of order
-# one that moves by as much is then as accurate as with the tolerance as absolute error
+# allowed error, divided by the tolerance times the scale of the motion: a state of
+# order one that moves by as much is then as accurate as if the tolerance were also its
+# absolute error
 _SHARE = 2.0
 # first step relative to the time in which a component moves by its own scale
 _FIRST = 0.125
@@ -24,7 +25,7 @@ def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
 
     A component on which a gap depends is measured from its start and has the scale of
     that gap, wherever the origin of its coordinate is; for any other component, the
-    scale is its magnitude. With several gaps, the smallest one counts. A gap that
+    scale is its magnitude. With several gaps, the smallest scale counts. A gap that
     cannot be distinguished from zero (`tinies`) is zero.
     """
     origin, found = [], []
@@ -36,7 +37,8 @@ def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
             height, share = jnp.abs(jet.gap), jnp.abs(lift[i])
             height = jnp.where(height <= tiny, 0.0, height)
             seen = share > 0
-            # its share of the shortest path to the surface, and the path along it alone
+            # the component's share of the shortest path to the surface, and the path to
+            # it if only this component changes
             alone = height * square / jnp.where(seen, share, 1.0)
             near = jnp.clip(own, height * share, jnp.where(seen, alone, jnp.inf))
             least = jnp.minimum(least, jnp.where(seen, near, jnp.inf))
@@ -89,8 +91,8 @@ def held_scales(scale, carried, push, kicks, pairs, h) -> tuple:
 
 
 def error_allowed(scale, before, after, tolerance, absolute) -> tuple:
-    """Return the error that a step may have in each component; anything below it is
-    rounding.
+    """Return the error that a step may have in each component; unless `absolute` is
+    given, it is at least the rounding error.
 
     **Arguments:** scales, states at both ends, the relative tolerance, and the absolute
     error requested for each component, or `None` for a fraction of the scale.

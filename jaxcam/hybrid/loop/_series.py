@@ -40,9 +40,11 @@ def taylor_of_release(functions, x, rates, frame, jets, tau, mode):
 
 
 def off_rounding(frame, jets, x, hit, extents):
-    """Remove the rounding error of the gap from the state after an impact, and from its
-    jets. The error would accumulate over the impacts of a chatter sequence, whose last
-    flights are lower than that. A gap that hardly depends on the state is left
+    """Return the state after an impact, and its jets, without the rounding error of the
+    gap.
+
+    This error would accumulate over the impacts of a chatter sequence, whose last
+    flights are lower than the error. A gap that hardly depends on the state is left
     unchanged, because its correction would move the state far. The other gaps change as
     well, by more than their own rounding if the time is large and the constraint that
     was hit is moving.

@@ -16,8 +16,8 @@ def settles(
     pairs = zip(settled, made.scale, strict=True)
     allowed = [1e-7 * (jnp.abs(a) + w) for a, w in pairs]
     if functions.m > 1:
-        # a component that has never moved, as the angle of a body that lands flat, has
-        # no scale
+        # a component that has never moved, such as the angle of a body that lands flat,
+        # has no scale
         for k, blur in enumerate(carried.blur[: functions.m]):
             ways = zip(made.frame.lift[k], made.frame.push[k], strict=True)
             moves = [jnp.abs(a) + jnp.abs(b) / carried.longest for a, b in ways]

@@ -1,4 +1,4 @@
-"""Reject invalid starts, traced or not, and find the sides of surfaces they are on."""
+"""Reject invalid starts, traced or not, and find on which sides motions start."""
 
 import jax.numpy as jnp
 
@@ -31,13 +31,13 @@ def first_status(t0, x, t1, gaps, rooms):
 def first_sides(functions: Functions, t, x, contact):
     """Return the sides of the switching surfaces on which a motion starts.
 
-    A start on a surface takes the side that its motion enters, or slides along it.
-    Where both branches leave the surface, it stays on the side that the system gives.
+    A motion that starts on a surface enters one of its sides, or slides along it. If
+    both branches leave the surface, the system determines the side.
 
     Returns:
-        Flags of the negative sides, then of sliding; the jets of the surfaces there,
-        not yet of sliding; whether the motion slides along a surface; and whether it
-        would have to, but cannot.
+        Flags of the negative sides, then of sliding; the jets of the surfaces there, as
+        if the motion did not slide; whether the motion slides along a surface; and
+        whether it would have to, but cannot.
     """
     if not functions.k:
         return (), [], False, False
@@ -47,7 +47,9 @@ def first_sides(functions: Functions, t, x, contact):
     touched = list(free)
 
     def jet_of(k, flag):
-        """Return the jet of a surface on one of its sides, and whether x is on it."""
+        """Return the jet of a surface on one of its sides, whether x is on the surface,
+        and whether the motion then moves into it.
+        """
         mode = (*contact, *sides[:k], flag, *sides[k + 1 :], *free)
         jets, roundings = functions.open_surfaces(t, x, mode)
         jet, rounding = jets[k], roundings[k]
@@ -61,7 +63,8 @@ def first_sides(functions: Functions, t, x, contact):
         touched[k] = on
         if k in functions.slidable:
             slack = functions.slack((*contact, *sides, *free))[k]
-            # both branches together, and the most that the stronger hold leaves of it
+            # rate at which both branches together hold the motion on the surface; one
+            # of them may drive it away at up to `slack` times this rate
             together = -(own.velocity + other.velocity)
             fastest = jnp.maximum(own.velocity, other.velocity)
             slides[k] = on & (together > 0) & (fastest <= slack * together)
@@ -78,8 +81,8 @@ def _held_together(functions: Functions, t, x, contact, sides, touched, slides):
     """Return the sides, and the surfaces on which a motion slides at the start.
 
     Several surfaces that are touched may hold the motion together, although it would
-    leave one of them if it slid past the others. The one that is farthest from holding
-    it lets it go, until the others hold.
+    leave one of them if it slid past the others. The surface that is farthest from
+    holding the motion is left out, again and again, until the remaining ones hold it.
     """
     if len(functions.slidable) < 2:
         return sides, slides

@@ -22,10 +22,11 @@ class StepEnd(NamedTuple):
 
     length: Any
     t: Any
-    # time that must not be exceeded (s): a breakpoint or a requested time
+    # time that must not be exceeded (s), a breakpoint or a requested time; and the next
+    # requested time (s)
     stop: Any
     asked: Any
-    # whether the step ends there, otherwise its distance from there
+    # whether the step ends at `stop`, and the time from its end to `stop` otherwise
     at_stop: Any
     room: Any
     # the last breakpoint before the step, and the first after it
@@ -61,7 +62,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
         ]
     )
     if carried.crossed:
-        # nor after a jump of the state across a switching surface
+        # nor does time pass after a jump of the state across a switching surface
         now = now | any_of(carried.behind)
     if carried.stale:
         now = now | (carried.stale[0] > 0)
@@ -76,7 +77,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
 
 
 def seen_from_inside(plan: Plan, end: StepEnd):
-    """Move the times of a step inside the adjacent breakpoints."""
+    """Return a function that moves times of a step inside the adjacent breakpoints."""
     if not plan.breaks:
         return lambda t: t
     (low, high), span = end.sides, plan.t1 - plan.t0
@@ -86,7 +87,7 @@ def seen_from_inside(plan: Plan, end: StepEnd):
 def make_step(
     functions: Functions, plan: Plan, carried: LoopState, end: StepEnd
 ) -> Step:
-    """Integrate the step to that end, in the current modes."""
+    """Integrate the step to its `end`, in the current mode."""
     inside, h = seen_from_inside(plan, end), end.length
     x, error, stages = step(
         plan.tableau,
@@ -106,13 +107,13 @@ def make_step(
     allowed = error_allowed(scale, carried.x, x, plan.tolerance, plan.absolute)
     effort = error_norm(error, allowed)
     if functions.planar:
-        # contact is algebraic: the old state is the guess
+        # the state in contact is found algebraically, and the old state is the guess
         sticking = any_of(carried.contact)
         x = select(sticking, carried.x, x)
         effort = jnp.where(sticking, 0.0, effort)
     jets = functions.jets(seen, x, carried.mode)
     projected = functions.onto(frame, jets, x, carried.mode)
-    # for surfaces, the jets contain the rates at x, and the projection is minute
+    # with surfaces, the jets contain the rates at x, and the projection is very small
     start = x if functions.k else projected
     rates = functions.taylor(seen, start, carried.mode)
     return Step(x, projected, jets, frame, rates, effort, scale)

@@ -1,7 +1,7 @@
 """Read programs traced by JAX.
 
-Functions called for every equation take no arrays and are not type-checked in the
-tests, which would take a fifth longer.
+Functions that are called for every equation take no arrays. They are not type-checked
+in the tests, because the tests would then take a fifth longer.
 """
 
 import math
@@ -36,8 +36,8 @@ _SAVING = "its_derivative_only_saves_work"
 
 @no_type_check
 def opened(equation):
-    """Return the program inside a call that only groups, and its constants; otherwise
-    `None`.
+    """Return the program inside a call that only groups operations, and its constants;
+    otherwise `None`.
     """
     if equation.primitive.name not in _GROUPS:
         return None
@@ -75,8 +75,10 @@ def used_inputs(closed: ClosedJaxpr) -> list[bool]:
 
 def saving_jvp(function: Callable) -> jax.custom_jvp:
     """Apply `jax.custom_jvp` with a derivative that is equal to that of the function
-    but cheaper. A function with a different rule must be called unchanged, but this one
-    may be inlined and is then as fast as any other arithmetic.
+    but cheaper.
+
+    Such a function may be inlined, and is then as fast as any other arithmetic. A
+    function with any other custom derivative must remain a call.
     """
 
     def marked(*arguments):
@@ -109,7 +111,7 @@ def fits_kernel(jaxpr) -> bool:
 def _needs_more(equation) -> bool:
     name = equation.primitive.name
     if name.startswith("scatter"):
-        # one index is a slice, several are a scatter
+        # a scatter at one index is the update of a slice, which fits
         return math.prod(equation.invars[1].aval.shape[:-1]) > 1
     if name == "dot_general":
         return equation.outvars[0].aval.ndim > 1

@@ -33,7 +33,7 @@ _NUMPY = {
 }
 
 
-# maximum number of cases of `numpy.choose`, the selector included
+# maximum number of arguments of `numpy.choose`, including the selector
 _CASES = 32
 
 

@@ -56,7 +56,7 @@ def _chosen(jaxpr) -> list:
 
 
 def _hoisted(jaxpr, constants):
-    """Return a program in which operations on constants only have been evaluated."""
+    """Return a program in which all operations on constants have been evaluated."""
     known = set(jaxpr.constvars)
     early, late = [], []
     for equation in jaxpr.eqns:
@@ -82,8 +82,8 @@ def _hoisted(jaxpr, constants):
 def with_kept(body: Callable, carry, on: bool = True):
     """Return a loop body that also carries its shared scalars.
 
-    **Arguments:** `body(carry) -> (carry, row)` and an example of the carry, scalars.
-    The row may be a pytree. Without `on`, nothing is kept.
+    **Arguments:** `body(carry) -> (carry, row)`, and an example of the carry, a pytree
+    of scalars. The row may be a pytree. Without `on`, nothing is kept.
 
     Returns:
         The new body, a function of `(carry, kept)`, and the initial `kept`.
@@ -123,11 +123,12 @@ def _keeping_nothing(body, state):
 
 
 def without_library(function: Callable, argument):
-    """Evaluate the library calls of `function` in advance if they do not depend on an
+    """Evaluate the library calls of `function` in advance if they do not depend on its
     argument.
 
-    A loop that calls one cannot be a single kernel. Other operations are not moved:
-    within the kernel, they cost less than as its arguments.
+    A loop that calls a library cannot be a single kernel. A function without library
+    calls is not changed: its operations on constants cost less within the kernel than
+    their results as its arguments.
     """
     leaves, treedef = jax.tree.flatten(argument)
 
@@ -148,7 +149,7 @@ def without_library(function: Callable, argument):
 
 
 def depend_on(value, kept):
-    """Make `value` depend on all kept scalars, which would otherwise be removed.
+    """Return `value`, which then depends on all kept scalars, so that all are computed.
 
     Adding 1e-300 does not change any possible count.
     """

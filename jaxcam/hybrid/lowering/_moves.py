@@ -24,7 +24,7 @@ MOVES = frozenset(
         "copy",
     }
 )
-"""Their names."""
+"""Names of operations that only move the elements of an array."""
 
 
 @no_type_check

@@ -2,9 +2,9 @@
 
 XLA's CPU backend compiles a small loop into a single function, but runs a large one as
 a sequence of kernels whose calls take longer than the arithmetic of a step. It marks
-small loops by an attribute on a call. This module sets the attribute in advance, for
-this loop only; versions of XLA without the attribute ignore it. The results are the
-same.
+small loops by an attribute on a call. This module sets the attribute in advance, only
+for the loop that it wraps; versions of XLA without the attribute ignore it. The results
+are the same.
 """
 
 from collections.abc import Callable

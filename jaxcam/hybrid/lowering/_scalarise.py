@@ -43,7 +43,7 @@ _SUMS = {
 
 
 _TURNS = frozenset({"sin", "cos", "tan"})
-# those that rules for series use
+# primitives that the rules for series use
 _PRIMITIVES = {
     "add": jax.lax.add_p,
     "add_any": jax.lax.add_p,
@@ -64,7 +64,7 @@ class SplitProgram:
     def __init__(self, call: Callable, *programs):
         self._call = call
         constants = [value for program in programs for value in program.consts]
-        # whether no constant belongs to the trace of its caller
+        # whether none of the constants belongs to the trace of the caller
         self.portable = not any(isinstance(value, Tracer) for value in constants)
 
     def __call__(self, *arguments, memory: Memory | None = None):
@@ -72,7 +72,7 @@ class SplitProgram:
 
 
 def joined(function: Callable) -> Callable:
-    """Convert a `function` of arrays to split arrays, by joining its arguments."""
+    """Convert a `function` of arrays to one of split arrays, by joining arguments."""
 
     def call(*arguments):
         return jax.tree.map(split, function(*(join(boxed(a)) for a in arguments)))
@@ -81,7 +81,7 @@ def joined(function: Callable) -> Callable:
 
 
 def scalarise(function: Callable, *example) -> SplitProgram:
-    """Evaluate `function` on split arguments and return split results.
+    """Return a `function` of arrays as a program with split arguments and results.
 
     **Arguments:** the function of arrays, and examples of its arguments (pytrees of
     arrays or `jax.ShapeDtypeStruct`).
@@ -101,7 +101,7 @@ def scalarise(function: Callable, *example) -> SplitProgram:
 
 
 def evaluated(closed, leaves, memory: Memory) -> list[np.ndarray]:
-    """Return the results of a program of arrays, not yet traced, for split
+    """Return the results, which are not traced yet, of a program of arrays for split
     arguments.
     """
     arguments = [boxed(leaf) for leaf in leaves]
@@ -134,7 +134,7 @@ def _evaluate(jaxpr, consts, arguments, memory):
 def _apply(equation, inputs, memory):
     name = equation.primitive.name
     params = equation.params
-    # a rule for reverse mode only contains only the body
+    # a call whose rule only saves work, or is for reverse mode only, becomes its body
     if has_saving_rule(equation) or name == "custom_vjp_call":
         inside = params["call_jaxpr"].jaxpr, params["call_jaxpr"].consts
     else:
@@ -272,7 +272,7 @@ def _rule_operation(equation, memory):
 
 
 def _by_derivatives(equation, inputs, memory):
-    """Evaluate any operation on arrays of series."""
+    """Evaluate any operation on arrays of series, by nested derivatives."""
     order = max(
         len(e.coefficients) - 1
         for i in inputs

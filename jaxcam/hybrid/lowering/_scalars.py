@@ -150,7 +150,7 @@ def _applied(operation: Callable, params, values):
 
 @functools.cache
 def _defaults(name: str) -> dict:
-    """Return parameters that a primitive has whenever JAX applies it."""
+    """Return the parameters that JAX adds whenever it applies a primitive."""
     if name != "mul":
         return {}
     # reverse mode fails without them
@@ -159,7 +159,7 @@ def _defaults(name: str) -> dict:
 
 @no_type_check
 def _identity(name, scalars):
-    """Simplify operations with zero or one, which differentiation leaves."""
+    """Simplify an operation with zero or one; differentiation leaves many of these."""
     if name == "select_n":
         which, *cases = scalars
         if is_known(which):

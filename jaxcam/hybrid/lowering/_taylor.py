@@ -1,10 +1,11 @@
 """Taylor series of a program of scalars along the motion that it defines.
 
 A program whose first result is the vector field determines the Taylor series of the
-motion: its coefficient of order k is that of the field of order k - 1, divided by k.
-Here, each scalar is replaced by its series, whose coefficients follow from those of the
-operands by recurrences. Nested derivatives would compute the same coefficients several
-times. (A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 13)
+motion: its coefficient of order k is the coefficient of order k - 1 of the field,
+divided by k. Here, each scalar is replaced by its series, whose coefficients follow
+from those of the operands by recurrences. Nested derivatives would compute the same
+coefficients several times. (A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed.,
+SIAM 2008, chapter 13)
 """
 
 import math
@@ -52,8 +53,8 @@ def in_series(name: str, params, elements, apply: Callable):
     """Return the result of an operation on series; None if there is no recurrence.
 
     **Arguments:** the name and parameters of a primitive, its operands, and
-    `apply(name, *scalars)`, which applies a primitive to scalars; this one with its
-    parameters.
+    `apply(name, *scalars)`, which applies a primitive to scalars, with `params` if it
+    is the primitive with this `name`.
     """
     order = max(len(e.coefficients) for e in elements if isinstance(e, Series)) - 1
     parts = [[coefficient(e, k) for k in range(order + 1)] for e in elements]
@@ -78,7 +79,7 @@ def in_series(name: str, params, elements, apply: Callable):
     return None
 
 
-# piecewise constant
+# operations whose results are piecewise constant
 _CONSTANT = frozenset(
     "and ceil eq floor ge gt is_finite le lt ne not or round sign xor".split()
 )
@@ -174,7 +175,7 @@ def _one_of(apply, order, first, a, b):
 
 
 def _slopes(apply, order, a):
-    """Return the coefficients of the rate of change, with its index."""
+    """Return the coefficients of a series, each multiplied by its index."""
     return [_ZERO] + [apply("mul", a[k], np.float64(k)) for k in range(1, order + 1)]
 
 
@@ -220,11 +221,11 @@ _RULES = {
 
 
 def by_nested_derivatives(function: Callable, order: int) -> Callable:
-    """Return the coefficients of the results of a function of arrays.
+    """Return a function that computes the coefficients of the results of a `function`.
 
     The new function returns a list of results for each order; those that are not real
-    numbers are constant. It takes, for each argument, a list of `order + 1` arrays, the
-    coefficients of its series; or, if it does not change, one array.
+    numbers are constant. For each argument, it takes a list of `order + 1` arrays, the
+    coefficients of its series; or, for a constant argument, one array.
     """
 
     def coefficients(*arguments):

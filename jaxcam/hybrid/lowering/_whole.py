@@ -32,7 +32,7 @@ _ONE_FUNCTION = {"inlineable": "false", "xla_cpu_small_call": "true"}
 
 
 class Program(NamedTuple):
-    """The content of the operation; hashable, compared by identity of the jaxpr."""
+    """The content of the primitive; hashable, and compared by identity of the jaxpr."""
 
     jaxpr: ClosedJaxpr
     # whether the CPU backend compiles it as one function
@@ -45,9 +45,9 @@ class Program(NamedTuple):
 def whole(function: Callable, *, kernel: dict[str, str] | None = None) -> Callable:
     """Wrap `function` as one primitive, which JAX transforms as a unit.
 
-    **Arguments:** a function of pytrees; their non-array leaves are static. With
-    `kernel`, attributes of the calls inside, the CPU backend compiles it as one
-    function, if it can.
+    **Arguments:** a function of pytrees, whose non-array leaves are static; and
+    `kernel`, attributes of the calls inside. If these are given, the CPU backend
+    compiles the primitive as one function, if it can.
 
     Returns:
         A function of the same arguments with the same results (arrays and static
@@ -139,9 +139,10 @@ def _on_cpu(*arguments, program: Program):
         arguments = jax.lax.optimization_barrier(arguments)
         return jaxpr_as_fun(program.jaxpr)(*arguments), arguments
 
-    # XLA aborts on such a call if optimisation leaves an argument unused, so all
-    # arguments are also results and all results are kept; and if an argument is a
-    # constant, as it becomes in a loop around the call
+    # XLA aborts on such a call if optimisation leaves an argument unused; therefore,
+    # all arguments are also results, and all results are kept. It also aborts if an
+    # argument is a constant, which may happen in a loop around the call; hence the
+    # barriers
     arguments = jax.lax.optimization_barrier(arguments)
     with set_xla_metadata(**_ONE_FUNCTION):
         made = jax.jit(with_arguments)(*arguments)
@@ -155,8 +156,8 @@ mlir.register_lowering(
 
 
 def _batched(program: Program, axis, mapped: list[bool], wanted: list[bool]):
-    """Return the program of a batch, and which outputs have a batch: all `wanted`, and
-    more.
+    """Return the program of a batch, and which outputs are batched: all that are
+    `wanted`, and possibly others.
 
     A program and the one from which it was derived agree on their common outputs.
     """

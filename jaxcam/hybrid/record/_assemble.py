@@ -36,11 +36,11 @@ def assemble(
     *,
     compiles: bool = False,
 ) -> Parts:
-    """Sort the rows of a log into impacts, contacts, steps and crossings of fixed
-    lengths; `mode` are the flags at the start.
+    """Sort the rows of a log into impacts, contacts, steps and crossings, padded to
+    fixed lengths; `mode` contains the flags at the start.
 
     With `xp=numpy`, a log that is not traced is sorted without compilation. Functions
-    of the system are then compiled by LLVM if it `compiles`.
+    of the system are then compiled by LLVM if `compiles` is true.
     """
     rows = log.kind.shape[0]
     k = _surfaces(system, t0, state)
@@ -89,7 +89,7 @@ def _nothing(xp: ModuleType, state, log: Log) -> tuple[Impacts, Contacts]:
 
 
 def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
-    """Return the events of switching surfaces, of which the first has number `m`."""
+    """Return the events at switching surfaces; the log numbers these from `m` on."""
     crossed = rows_of_kind(log, RowKind.SWITCH, RowKind.SLIDE, RowKind.LEAVE)
     number = xp.sum(crossed)
     index = _places(xp, crossed, size, 0)
@@ -166,8 +166,8 @@ def _least_to_come(xp: ModuleType, values):
 
 
 def _speeds(xp: ModuleType, system, times, sides, which, compiles: bool):
-    """Return the normal velocities at the constraints that were hit, before or after
-    impacts.
+    """Return the normal velocities at the constraints that were hit, before and after
+    the impacts.
     """
     count = times.shape[0]
     if xp is np and not count:

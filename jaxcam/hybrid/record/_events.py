@@ -180,7 +180,7 @@ class Steps(Printed):
 
 
 def impact_table(impacts: Impacts, sentence: str) -> ShortTable:
-    """Return a table of the times and speeds of impacts below a sentence."""
+    """Return a table of the times and speeds of impacts, headed by a sentence."""
     columns = (
         impacts.time,
         impacts.constraint,

@@ -17,7 +17,7 @@ class Printed(eqx.Module):
 
     @abc.abstractmethod
     def _table(self) -> ShortTable:
-        """Return the table, of known values."""
+        """Return the table; called only if all values are known."""
 
     def _batched(self) -> bool:
         """Return whether this is a batch of results."""

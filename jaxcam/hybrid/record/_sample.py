@@ -1,4 +1,4 @@
-"""Sample the state between points by one additional step of the same method."""
+"""Sample the state between integration points by one more step of the same method."""
 
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -39,14 +39,14 @@ class _Point(NamedTuple):
     end: Any
     state: Any
     contact: Any
-    # sides of the switching surfaces, empty without any
+    # sides of the switching surfaces; empty if there are none
     sides: Any
 
 
 class _Run(NamedTuple):
     """A run that is sampled."""
 
-    # prepared
+    # the prepared system
     system: Any
     settings: Settings
     # times of the first and the last point
@@ -67,7 +67,7 @@ def _sampled(run: _Run, point: _Point, shared: bool = True):
     mode = mode + tuple(s < 0 for s in sides) + tuple(s == 0 for s in sides)
 
     def inside(s):
-        # no step extends across a breakpoint, so no sample of a step does
+        # no step extends across a breakpoint, so the step to a sample must not either
         if system.breakpoints is None:
             return s
         return between(s, point.start, point.end, last - first)
@@ -101,7 +101,7 @@ def _points_of(steps: Steps, times, xp: ModuleType) -> _Point:
 
 @program
 def sample(system, settings: Settings, steps: Steps, times):
-    """Return the states at some times, `(times, n)`, in a program of XLA."""
+    """Return the states at some times, `(times, n)`, computed by XLA."""
     run = _run_of(system.prepared(), settings, steps, jnp)
     points = _points_of(steps, times, jnp)
     return jax.vmap(lambda point: _sampled(run, point, shared=False))(points)

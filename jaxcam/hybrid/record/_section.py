@@ -11,7 +11,7 @@ _PLACES = 8
 
 
 def crossings(trajectory, function, direction: int):
-    """Find the crossings; see `Trajectory.section`."""
+    """Return the times and states of the crossings; see `Trajectory.section`."""
 
     def look(times):
         # padded, so that few lengths are compiled

@@ -45,7 +45,7 @@ class Trajectory(Printed):
     code: Int[Array, ""]
     """Index into `RESULTS`: 0 if the run reached t1."""
     switches: Switches | None = None
-    """The crossings of switching surfaces; `None` for a system without any."""
+    """The events at switching surfaces; `None` for a system without such surfaces."""
 
     def _batched(self) -> bool:
         return np.ndim(self.code) > 0
@@ -98,7 +98,7 @@ class Trajectory(Printed):
             ValueError: `times` is not a vector, or a time is outside [t0, t1].
         """
         known = not (is_traced((self, times)) or is_tracing())
-        # in numpy if possible: jax would compile a program for every new length
+        # in numpy if possible, because jax would compile a program for every new length
         xp = np if known else jnp
         times = xp.asarray(times, dtype=xp.float64)
         if times.ndim != 1:

@@ -18,7 +18,7 @@ class Rebound(NamedTuple):
     hit: int
     # constraints in contact `(m,)`
     contact: np.ndarray
-    # normal velocities before and after the impact, two `(m,)`
+    # normal velocities before and after the impact, each `(m,)`
     speeds: list[np.ndarray]
     # fastest rebound so far
     fastest: float
@@ -40,7 +40,7 @@ def end_of_chatter(
     longest,
     several: bool = False,
 ) -> Rest | None:
-    """Return the rest at the end of the impacts, if they may be completed now.
+    """Return the `Rest` after the remaining impacts, if these may be completed now.
 
     **Arguments:** the relative rebound speed at which a chatter is completed (`depth`);
     the resolution of each gap (`tiny`); the longest step (s); and whether `several`
@@ -65,7 +65,7 @@ def end_of_chatter(
 
 
 def _joint_end(motion, rebound: Rebound, ratio, tiny, longest) -> Rest | None:
-    """Return the rest on several constraints, if what precedes it is negligible.
+    """Return the `Rest` on several constraints, if flights before it are negligible.
 
     **Arguments:** the `ratio` of rebound to approach; others as in `end_of_chatter`.
     """
@@ -103,7 +103,7 @@ def _stays_alone(motion, rebound: Rebound, length: float, tiny) -> bool:
     mean = free - free[hit] * jump / jump[hit] if jump[hit] > 0 else free
     left = gap + length * (speed + length * np.minimum(free, mean) / 2)
     rises = speed + length * np.minimum(free, mean) > 0
-    # a body that leaves, and still does so at the end
+    # a body that leaves the constraint, and is still leaving it at the end
     clear = contact | (left > 0) | (rises & (gap >= -tiny))
     clear[hit] = True
     return bool(np.all(clear))

@@ -13,8 +13,8 @@ from ._motion import CompiledMotion, FRACTIONS
 
 
 class PieceEnd(NamedTuple):
-    """The event that ends a piece: constraint, row of the last point before, time since
-    (s).
+    """The event that ends a piece: its constraint, the row of the last point before it,
+    and the time from that point to the event (s).
     """
 
     constraint: int
@@ -40,8 +40,8 @@ class Flown(NamedTuple):
     tiny: Float[np.ndarray, " m"]
 
     def first_event(self, count, fired, first, first_rate, t1) -> PieceEnd | None:
-        """Return the first event among the steps; `TOO_LONG` where the first step hid
-        one.
+        """Return the first event in the steps; `TOO_LONG` if the first step has passed
+        over one.
 
         **Arguments:** the number of points, whether diffrax `fired` an event at the
         last of them, levels and rates `(m,)` at the first, and the end of the run (s).
@@ -65,7 +65,7 @@ class Flown(NamedTuple):
                 if slope < 0 and end <= -slope * 1e-2 * h + 10 * tiny:
                     event = self._locate(k, i, 0.0, None, h)
             if event is not None:
-                # no step ends after t1, so an event there is due to rounding
+                # no step ends after t1, so an event after t1 is due to rounding
                 length = min(event.length, t1 - times[event.row])
                 found.append(event._replace(length=float(length)))
         return min(found, key=lambda e: times[e.row] + e.length, default=None)
@@ -73,7 +73,7 @@ class Flown(NamedTuple):
     def _crossing(self, k, curve, before, slope, tiny):
         """Return where a level first falls below zero, based on points in the steps."""
         if before <= tiny:
-            # leaves the surface: its rate may be zero to within rounding
+            # the motion leaves the surface, so a negative rate is due to rounding
             slope = max(slope, 0.0)
         started_on_surface = before <= tiny
         for i, (levels, rates) in enumerate(zip(*curve, strict=True)):
@@ -95,8 +95,8 @@ class Flown(NamedTuple):
         return None
 
     def _locate(self, k, i, low, high, start=None) -> PieceEnd:
-        """Find the length (s) from point `i` by Newton's method, between `low` and
-        `high`.
+        """Return the event after point `i`; Newton's method finds the time from that
+        point, `length` (s), between `low` and `high`.
         """
         h = high if start is None else start
         change, span = np.inf, float(self.times[i + 1] - self.times[i])

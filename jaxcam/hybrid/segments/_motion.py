@@ -43,8 +43,8 @@ FRACTIONS = np.arange(1, 9) / 8
 
 
 def _compiled(method):
-    """Compile a function only once: numbers become arrays, which are not part of the
-    program.
+    """Compile a method only once: numbers are passed as arrays, which are not part of
+    the program.
     """
     compiled = program(method)
 
@@ -117,7 +117,7 @@ class CompiledMotion(eqx.Module):
         )
         assert solution.ts is not None and solution.ys is not None
         real = jnp.isfinite(solution.ts)
-        # the end is `t1` itself
+        # the last time is `t1` itself, without a rounding error
         times = jnp.where(solution.ts == t1 - t0, t1, t0 + solution.ts)
         states = jnp.where(
             real[:, None], x[None] + self.scale[None] * solution.ys, jnp.inf
@@ -201,7 +201,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def extents(self, t, x):
-        """Return the origins of the components, and their first scales, two `(n,)`."""
+        """Return the origins of the components, and their first scales, each `(n,)`."""
         gradient = jax.jacfwd(lambda y: gaps(self.system, t, y))(x)
         lifts = gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
         jets = [Jet(*row) for row in jnp.stack(self._free_series(3)(t, x), axis=1)]
@@ -216,7 +216,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def slopes(self, t, x, contact):
-        """Return the absolute derivatives of the rates by the state, `(n, n)`."""
+        """Return the sizes of the derivatives of the rates by the state, `(n, n)`."""
         return jnp.abs(jax.jacfwd(lambda y: self._field(t, y, contact))(x))
 
     @_compiled

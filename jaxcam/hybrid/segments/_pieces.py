@@ -68,7 +68,7 @@ class _Engine:
         self.settings = settings
         self.motion = CompiledMotion(prepared(system), settings, np.ones_like(state))
         self.span = t1 - t0
-        # breakpoints are passed between pieces: time of the next one
+        # breakpoints, which are passed between pieces, and their period
         own = system.period
         self.breaks = breakpoints.declared(system)
         self.repeat = np.inf if own is None else own
@@ -86,7 +86,7 @@ class _Engine:
         # the first step of the next piece, shortened if it is too long
         self.first = np.inf
         self.fastest = 0.0
-        # released at this instant: gap and velocity are zero and growing
+        # constraint released at this instant: its gap and velocity grow from zero
         self.released: int | None = None
         # consecutive impacts while another gap was closed to within rounding, but not
         # in contact
@@ -106,7 +106,7 @@ class _Engine:
             return
         for k in range(len(level)):
             if self.contact[k]:
-                # rounding may put a start at a release on either side of it
+                # rounding may put a start at a release on either side of the release
                 wait = -level[k] / rate[k] if rate[k] < 0 else np.inf
                 if level[k] < 0 or wait <= 1e-15 * (self.span + abs(self.t)):
                     self._release(k, self.t, self.x)
@@ -184,9 +184,10 @@ class _Engine:
             self._impact(event.constraint, t, there.state)
 
     def _hop(self, jets) -> bool:
-        """Compute a flight too low to rise above rounding; return whether it occurred.
+        """Compute the next flight if it is too low to rise above rounding, and return
+        whether it is.
 
-        The height is taken from the integral of the normal velocity instead.
+        Its height is taken from the integral of the normal velocity, not from the gap.
         """
         if not self.rows or self.rows[-1][0] != RowKind.IMPACT:
             return False
@@ -241,7 +242,7 @@ class _Engine:
         self._row(RowKind.IMPACT, k, t, after, before)
 
     def _after_impact(self, k, t, before):
-        """Return whether several constraints are hit at once, and the state then."""
+        """Return whether several constraints are hit at once, and the state after."""
         if may_hit_together(self.motion.system, len(before), len(self.contact)):
             gaps = np.asarray(self.motion.jets(t, before))[:, 0]
             speeds = np.asarray(self.motion.velocity(t, before))
@@ -335,7 +336,7 @@ class _Engine:
         self.motion = self.motion.measured(scale)
 
     def _tiny(self, states):
-        """Return the rounding error of each gap, along some states."""
+        """Return the resolution of each gap, limited by rounding, along some states."""
         reach = np.abs(states).max(axis=0) + self.extents
         return 500 * np.asarray(self.motion.rounding(self.t, self.x, reach))[0]
 

@@ -69,8 +69,8 @@ def completion_time(
 def completion_coefficients(system, t, before, after):
     """Return C and r0 of each constraint, for an impact from `before` to `after`.
 
-    It also returns the state P without normal velocity, one row for each constraint, as
-    if each had been hit.
+    The third result is the state P without normal velocity, one row for each
+    constraint, as if that constraint had been hit.
     """
     velocity_before = normal_velocity(system, t, before)
     velocity_after = normal_velocity(system, t, after)

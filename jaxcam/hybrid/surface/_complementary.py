@@ -13,16 +13,17 @@ _REDUNDANT = 1e-12
 def complementary(
     matrix: Float[Array, "m m"], right: Float[Array, " m"], closed: Bool[Array, " m"]
 ) -> Float[Array, " m"]:
-    """Return p >= 0 with right + matrix p >= 0, one of both zero for each unknown.
+    """Return p >= 0 with right + matrix p >= 0, where one of the two is zero for each
+    unknown.
 
-    Of the 2^m active sets, the one whose smallest number is largest is the solution, so
-    that rounding does not exclude it. The loops are unrolled, because a batch of such
-    small problems then stays elementwise.
+    The solution belongs to that of the 2^m active sets for which the smallest of these
+    numbers is largest, so that rounding does not exclude it. The loops are unrolled,
+    because a batch of such small problems then stays elementwise.
 
     **Arguments:**
 
     - `matrix`: its diagonal is one, and its principal minors are not negative.
-    - `closed`: for unknowns that are not, p is zero and there is no condition.
+    - `closed`: which unknowns take part; for the others, p is zero without a condition.
     """
     number = right.shape[0]
     best, found = jnp.asarray(-jnp.inf), jnp.zeros_like(right)

@@ -1,11 +1,11 @@
 """Find where friction makes a contact force ambiguous or impossible.
 
-While a body slips, the normal acceleration of a contact is a + c q: a is that without
-the contact force q, and c, which is one without friction, changes in proportion to the
-friction coefficient. If c <= 0, pressing does not push the body away: there is no
-contact force for a < 0, and there are two for a > 0 (P. Painleve, Comptes Rendus 121,
-1895; F. Genot, B. Brogliato, New results on Painleve paradoxes, European Journal of
-Mechanics A 18, 1999). With several contacts, c is a matrix, and the forces exist and
+While a body slips, the normal acceleration of a contact is a + c q: a is its value
+without the contact force q, and c, which is one without friction, changes in proportion
+to the friction coefficient. If c <= 0, pressing does not push the body away: there is
+no contact force for a < 0, and there are two for a > 0 (P. Painleve, Comptes Rendus
+121, 1895; F. Genot, B. Brogliato, New results on Painleve paradoxes, European Journal
+of Mechanics A 18, 1999). With several contacts, c is a matrix, and the forces exist and
 are unique for every a if all its principal minors are positive (R. W. Cottle, J.-S.
 Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section 3.3).
 """

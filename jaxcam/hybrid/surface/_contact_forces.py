@@ -18,9 +18,9 @@ from ._normal import gaps, normal_velocity, unit_directions
 
 
 class ContactTerms(NamedTuple):
-    """What the contact forces depend on, apart from the field and friction.
+    """Terms on which the contact forces depend, apart from the field and friction.
 
-    It is the same on all sides of the switching surfaces.
+    They are the same on all sides of the switching surfaces.
     """
 
     # rates of the normal velocities with time and with the state
@@ -52,7 +52,7 @@ def contact_forces(
     contact: Bool[Array, " m"],
     terms: ContactTerms | None = None,
 ) -> ContactForces:
-    """Return multipliers and field; the `terms` need not be computed again."""
+    """Return multipliers and field; `terms` that are given are not computed again."""
     drift, gradient, pushes = contact_terms(system, t, x) if terms is None else terms
     free = system.vector_field(t, x)
     acceleration = drift + gradient @ free

@@ -61,7 +61,7 @@ def contact_impulses(
         codes = _states(index, number, given)
         impulses, after = _solved(*known, codes)
         least = _least(impulses / size, after / sizes, codes, closed, given)
-        # positive if valid
+        # the rank is positive if the combination is valid
         small = size / (size + jnp.sum(impulses[number:]))
         rank = jnp.where(least >= -_ROUNDING, small, least)
         improves = rank > best
@@ -93,7 +93,7 @@ def _states(index, number: int, given) -> Int[Array, " m"]:
 
 
 def _solved(matrix, velocities, given, codes):
-    """Return the impulses of contacts in these states, and the velocities then."""
+    """Return the impulses for these contact states, and the velocities after them."""
     number = len(codes)
     back, sticks = codes == _SLIPS_BACK, codes == _STICKS
     transfer = matrix[:, :number]

@@ -7,8 +7,8 @@ decreases at a constant rate until it is zero; then it remains zero if friction 
 (the condition of Filippov for sliding), otherwise it reverses. The chosen
 hypothesis of restitution (Newton, Poisson or Stronge) determines where the impact ends.
 
-The fourth law knows only the velocities after the impact: Newton's coefficient, and all
-friction in the direction of the slip then.
+The fourth law (Moreau) considers only the velocities after the impact: it uses Newton's
+coefficient, and all of the friction opposes the slip after the impact.
 """
 
 from typing import Any, NamedTuple
@@ -53,12 +53,12 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
     if kind == "complementarity":
         return _by_final_slip(side * slip, -(1 + restitution) * approach, rates)
     before = _of_side(side > 0, rates)
-    # rate of the size of the slip, and when it ends
+    # rate at which the slip decreases, and impulse at which it ends
     closing = -side * before[0]
     slows = closing > 0
     first = jnp.where(slows, slip / jnp.where(slows, closing, 1.0), jnp.inf)
-    # afterwards: no slip if friction holds it on both sides, otherwise it reverses (or,
-    # from zero slip, begins)
+    # afterwards, there is no slip if friction prevents it in both directions; otherwise
+    # it reverses (or begins, if it was zero)
     (s1, v1), (s2, v2) = rates
     holds = (s1 <= 0) & (s2 >= 0)
     span = jnp.where(holds & (s2 > s1), s2 - s1, 1.0)
@@ -82,7 +82,7 @@ def _by_final_slip(slip, change, rates: Rates) -> Impulses:
     behind = change / jnp.where(v2 > 0, v2, 1.0)
     forward = (v1 > 0) & (slip + s1 * ahead >= 0)
     backward = (v2 > 0) & (slip + s2 * behind <= 0)
-    # both velocities are given if it sticks
+    # if the contact sticks, both velocities after the impact are given
     sticks = ~(forward | backward)
     both = jnp.where(sticks, s2 * v1 - s1 * v2, 1.0)
     held = jnp.where(sticks, slip, 0.0)
@@ -117,7 +117,9 @@ def _kinetic(approach, restitution, first, slope, later):
 
 
 def _energetic(approach, restitution, first, slope, later):
-    """The work of the normal force in restitution is e^2 times that in compression."""
+    """Return the impulse for which the work of the normal force in restitution is e^2
+    times that in compression.
+    """
     stopped = _reaching(0.0 * approach, approach, first, slope, later)
     bounded = jnp.isfinite(first)
     reached = jnp.where(bounded, first, 0.0)
@@ -125,7 +127,7 @@ def _energetic(approach, restitution, first, slope, later):
     lasts = first >= stopped
     rate = jnp.where(lasts, slope, 1.0)
     between = approach + slope * reached
-    # twice the work in compression, and what is wanted in restitution
+    # twice the work in compression, and twice the work wanted in restitution
     two = between**2 / later - (approach + between) * reached
     wanted = restitution**2 * jnp.where(lasts, approach**2 / rate, two)
     # in restitution, the first phase adds this impulse, at most

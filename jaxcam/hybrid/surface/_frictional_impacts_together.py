@@ -8,10 +8,11 @@ opposes the slip after it. (J. J. Moreau, Unilateral contact and dry friction in
 freedom dynamics, 1988; C. Glocker, F. Pfeiffer, Multiple impacts with friction in rigid
 multibody systems, Nonlinear Dynamics 7, 1995)
 
-Compression alone never creates energy. What restitution adds to it is reduced at all
-contacts, if necessary, until an impact does not create energy either; friction is then
-within its limits, but need not reach them at a contact that slips. The energy is known
-without the masses if the friction of a contact acts against its switching function.
+Compression alone never creates energy. The impulses that restitution adds are reduced
+at all contacts, if necessary, until the whole impact does not create energy either;
+friction is then within its limits, but need not reach them at a contact that slips. The
+energy is known without the masses if the friction of a contact acts against its
+switching function.
 """
 
 from typing import NamedTuple
@@ -43,8 +44,8 @@ def frictional_impacts_together(
         closed,
     )
     newton = restitution_kind(system) in ("kinematic", "complementarity")
-    # a scan of length one keeps the arrays, which would else be split into thousands of
-    # scalars
+    # a scan of length one keeps the arrays, which would otherwise be split into
+    # thousands of scalars
     _, found = jax.lax.scan(
         lambda _, __: (None, _impulses(*sent, newton)), None, None, length=1
     )
@@ -96,10 +97,10 @@ def _largest(velocities, closed):
 
 class _Rubbing(NamedTuple):
     """The slip velocities, their derivatives by the state, the friction during positive
-    slip, and its change from positive to negative slip, of each contact.
+    slip, and the change of friction from positive to negative slip, of each contact.
 
-    The unit of a slip velocity is its change by that change of friction; it is zero
-    without friction.
+    A slip velocity is given in units of its change due to that change of friction;
+    without friction, it is zero.
     """
 
     slips: Float[Array, " m"]

@@ -70,8 +70,8 @@ def frictionless_law(system: HybridSystem, t: RealScalar, x: State) -> Frictionl
         x: State just before an impact, shape `(n,)`.
 
     Returns:
-        The law; directions and coefficients of a constraint that does not approach, or
-            only by a rounding error, are the limits of slow impacts.
+        The law; for a constraint that is not approached, to within rounding, direction
+            and coefficient are the limits of slow impacts.
     """
     after = jnp.atleast_2d(system.impact(t, x))
     before = normal_velocity(system, t, x)
@@ -117,8 +117,8 @@ def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
 def _with_friction(
     system: HybridSystem, t: RealScalar, x: State, after: Float[Array, "m n"]
 ) -> Float[Array, "m n"]:
-    """Add the impulses of friction to frictionless impacts, and change those in the
-    normal direction accordingly.
+    """Add the impulses of friction to frictionless impacts, and change the normal
+    impulses accordingly.
     """
     sides, kind = sides_of(system, t, x), restitution_kind(system)
     before = normal_velocity(system, t, x)
@@ -137,7 +137,7 @@ def _with_friction(
 def _law(system, t, x, before, after, slow):
     """Return the directions and coefficients that frictionless impacts give.
 
-    Up to the approach velocities `slow`, they are limits.
+    Up to the approach velocities `slow`, they are the limits of slow impacts.
     """
     limits = normal_directions(system, t, x)
     directions, coefficients = [], []
@@ -179,9 +179,12 @@ class Contact(NamedTuple):
 
 
 def contact_at(system, t, x, k: int, sides, direction) -> Contact:
-    """Find the switching function on which the friction of constraint `k` depends."""
+    """Return the slip and friction of constraint `k`.
+
+    The slip is the switching function on which the friction depends.
+    """
     same = friction_on(system, t, x, sides)[k]
-    # without one, friction never changes
+    # without such a function, the friction never changes
     found: tuple = jnp.asarray(1.0), jnp.asarray(jnp.inf), same, same
     place = jnp.asarray(0)
     for j in reversed(range(len(sides))):

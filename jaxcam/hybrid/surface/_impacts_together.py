@@ -4,17 +4,17 @@ The impulses of all constraints act together, in compression and then in restitu
 (Poisson's law). Without friction, with the normal velocities v and the matrix G of
 their changes by the impulses p:
 
-- compression ends with v' = v + G p >= 0, p >= 0, one of both zero at each constraint
-  (a linear complementarity problem): no gap closes any more;
+- compression ends with v' = v + G p >= 0 and p >= 0, one of the two being zero at each
+  constraint (a linear complementarity problem): no gap closes any more;
 - restitution adds the impulses e p, with the coefficient e of each constraint;
 - if a gap would still close, a last compression prevents it.
 
-No step depends on an order of the constraints. With equal coefficients, restitution
+No step depends on the order of the constraints. With equal coefficients, restitution
 returns e^2 of the energy lost in compression; with different coefficients of
 constraints that influence each other, e p might return more than was lost. It is then
-reduced to the part that returns the square of the largest coefficient, so that impacts
-never create energy. (C. Glocker, F. Pfeiffer, Multiple impacts with friction in rigid
-multibody systems, Nonlinear Dynamics 7, 1995)
+reduced to the part that returns the lost energy times the square of the largest
+coefficient, so that impacts never create energy. (C. Glocker, F. Pfeiffer, Multiple
+impacts with friction in rigid multibody systems, Nonlinear Dynamics 7, 1995)
 
 `_frictional_impacts_together.py` is for contacts with friction.
 """
@@ -30,8 +30,8 @@ from ._impacts import frictionless_law
 from ._restitution_bound import restitution_bound
 
 
-# more constraints than this hit one after the other: there are 2^m active sets, with
-# friction 4^m
+# more constraints than this are hit one after the other, because there are 2^m active
+# sets, or 4^m with friction
 MOST_TOGETHER = 4
 MOST_WITH_FRICTION = 3
 
@@ -40,7 +40,7 @@ def may_hit_together(system: HybridSystem, states: int, number: int) -> bool:
     """Return whether impacts may be applied together.
 
     A body with one direction of motion, that is, up to three states (with a phase),
-    cannot approach different constraints.
+    cannot approach several constraints at once.
 
     **Arguments:** the system, its number of states, and its number of constraints.
     """

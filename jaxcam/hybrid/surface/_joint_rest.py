@@ -35,7 +35,7 @@ def joint_rest(
         system: The system.
         t: Time (s).
         x: State close to rest on these constraints, shape `(n,)`.
-        touching: Which constraints are meant, shape `(m,)`.
+        touching: Whether the bodies rest on each constraint, shape `(m,)`.
 
     Returns:
         The state, shape `(n,)`, and the multipliers q of

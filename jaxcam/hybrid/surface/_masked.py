@@ -4,11 +4,11 @@ import jax.numpy as jnp
 
 
 def solve_masked(matrix, right, mask):
-    """Solve for the masked unknowns, zero elsewhere; elimination without pivoting.
+    """Return the solution for the masked unknowns, zero elsewhere.
 
-    The diagonal of the matrix is not zero where the mask holds; it is unrolled, because
-    it is small (a row for each constraint or surface), so that a batch of them stays
-    elementwise.
+    The diagonal of the matrix must not be zero where the mask holds, because the
+    elimination has no pivoting. The elimination is unrolled, because the matrix is
+    small (a row for each constraint or surface); a batch then stays elementwise.
     """
     number = right.shape[0]
     rows = [

@@ -3,7 +3,7 @@
 The notation is that of the thesis: H is the gap, v = dH/dt the normal velocity, a and j
 are its first and second derivatives along the active field, and W is the impulse
 direction in x+ = x + W v (thesis, eq. 2.27). Here, the unit direction D = W / (v_x W)
-is used: moving by D changes the normal velocity by one and leaves the gap unchanged. It
+is used: moving by D changes the normal velocity by one and leaves the gap unchanged. D
 does not depend on the restitution, and the sticking field (thesis, eqs. 2.30 and 2.31)
 becomes F - a D.
 """

@@ -97,7 +97,7 @@ def _onto(system: HybridSystem, t: RealScalar, x: State) -> State:
 def release_point(
     system: HybridSystem, t: RealScalar, guess=None, samples: int = 512
 ) -> ReleasePoint:
-    """Find the last release at or before `t` by a scan over one period.
+    """Return the last release at or before `t`, found by a scan over one period.
 
     Args:
         system: A system with a `period`, two states and one constraint.

@@ -18,7 +18,7 @@ def restitution_bound(
     """Return the factor, up to one, by which the energy limits each impulse of
     restitution.
 
-    The impulses that influence each other may return the energy that was lost in
+    Impulses that influence each other may together return the energy that they lost in
     compression, times the square of their largest coefficient of restitution.
 
     **Arguments:** the changes of all velocities by unit impulses; the velocities before
@@ -53,9 +53,9 @@ def _inverse_mass_ratios(
     matrix: Float[Array, "k k"],
 ) -> tuple[Float[Array, "k k"], Bool[Array, "k k"]]:
     """Return the ratios of the inverse masses of the impulses, zero between those that
-    do not influence each other, and which do, if only through others.
+    do not influence each other; and which impulses do, even if only through others.
 
-    The matrix is symmetric but for these masses: G_ab / m_a = G_ba / m_b.
+    The matrix is symmetric except for these masses: G_ab / m_a = G_ba / m_b.
     """
     number = len(matrix)
     itself = jnp.eye(number, dtype=bool)

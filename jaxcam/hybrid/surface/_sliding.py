@@ -5,15 +5,15 @@ While a motion slides on surfaces, its field is
     F = F_0 + sum_k b_k (F_k - F_0),
 
 where F_0 is the branch on the sides from which it came and F_k the branch beyond
-surface k, with shares b such that the switching functions of all of them stay zero. On
-one surface this is Filippov's convex combination. On several, it is exact where the
-effects of the sides add up, as those of several dry-friction forces do. (A. F.
+surface k, with weights b such that the switching functions of all these surfaces stay
+zero. On one surface, this is Filippov's convex combination. On several, it is exact if
+the effects of the sides add up, as those of several dry-friction forces do. (A. F.
 Filippov, Differential Equations with Discontinuous Righthand Sides, 1988, section 4; R.
 I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
 2004, chapter 4)
 
 The distance of a surface is its switching function on the side of the motion, plus its
-hysteresis: positive before a crossing, zero at it, as a gap is at an impact. While the
+hysteresis. It is positive before a crossing and zero at it, like a gap. While the
 motion slides, the distance is (b + s) (1 + s - b) instead, with s = (holding - 1) / 2:
 sliding ends where it falls to zero.
 """
@@ -33,8 +33,8 @@ from ._rounding import gap_rounding, rounding_of
 from ._switches import OnSides, surfaces
 
 
-# a surface is held by a contact if the contact forces undo this fraction of the change
-# that its sides make
+# a contact holds the motion at a surface if the contact forces undo the change that the
+# sides make, except for this fraction
 _UNDONE = 1e-12
 
 
@@ -50,8 +50,8 @@ class Jumps(NamedTuple):
 
 
 class InMode(OnSides):
-    """A switched system in one mode: sides of surfaces, and surfaces that it slides
-    on.
+    """A switched system in one mode: sides of surfaces, surfaces on which the motion
+    slides, and contacts.
     """
 
     sliding: Bool[Array, " k"]
@@ -93,10 +93,10 @@ class SlideTerms(NamedTuple):
     # switching functions on the side of the motion, and their rates there
     heights: Float[Array, " K"]
     slopes: Float[Array, " K"]
-    # change of the field beyond each surface, and of the rates of all heights by it
+    # change of the field beyond each surface, and the changes of all slopes due to it
     kicks: Float[Array, "K n"]
     gains: Float[Array, "K K"]
-    # whether the sides drive the motion to the surface when it leaves it
+    # whether the sides drive a motion that leaves the surface back to it
     firm: Bool[Array, " K"]
     # whether a contact holds the motion at rest there, whatever the sides
     still: Bool[Array, " K"]
@@ -159,10 +159,10 @@ def _own(gains: Float[Array, "K K"]) -> Float[Array, " K"]:
 
 
 def _returns(mode: InMode, gains: Float[Array, "K K"], least) -> Float[Array, " K"]:
-    """Return the change of the rate of each height by its own side.
+    """Return the change of each slope due to the side of its own surface.
 
-    If it is not above `least`, the change while the motion slides on the others: their
-    sides may drive it back instead.
+    If this change is not above `least`, return the change while the motion slides on
+    the other surfaces, whose sides may drive it back instead.
     """
     own, number = _own(gains), len(gains)
     if number == 1:
@@ -182,8 +182,8 @@ def _only(changed: tuple[int, ...], change: State) -> State:
 
 
 def shares(mode: InMode, terms: SlideTerms) -> Float[Array, " K"]:
-    """Return the weight b of the branch beyond each surface, zero if it does not
-    slide.
+    """Return the weight b of the branch beyond each surface, zero if the motion does
+    not slide.
     """
     return solve_masked(terms.gains, -terms.slopes, _slides_on(mode) & terms.firm)
 
@@ -196,8 +196,8 @@ def field_in_mode(mode: InMode, t, x) -> State:
 def forces_in_mode(mode: InMode, t, x) -> tuple[Float[Array, " m"], State]:
     """Return the multipliers of the constraints, and the field.
 
-    Like the field, the multipliers are those of the branch and the weights of their
-    changes.
+    Like the field, the multipliers are those of the branch plus their weighted changes
+    beyond the surfaces.
     """
     if not mode.slidable:
         if mode.contact.shape[0]:
@@ -213,7 +213,7 @@ def forces_in_mode(mode: InMode, t, x) -> tuple[Float[Array, " m"], State]:
 
 
 def _combined(mode: InMode, terms: SlideTerms) -> State:
-    """Return the field of the branch and the weights of its changes."""
+    """Return the field of the branch plus its weighted changes beyond the surfaces."""
     parts, found = list(terms.field), shares(mode, terms)
     for kick, share, k in zip(terms.kicks, found, mode.slidable, strict=True):
         # contact forces pass a change on to other components
@@ -229,7 +229,7 @@ def _slides_on(mode: InMode):
 
 
 def _of_each(value, mode: OnSides) -> Float[Array, " k"]:
-    """Return a number of a system as one for each surface."""
+    """Return a value of a system, repeated for each surface if it is one number."""
     return jnp.broadcast_to(jnp.asarray(value, dtype=jnp.float64), mode.negative.shape)
 
 
@@ -257,8 +257,8 @@ def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
 
 
 def open_surfaces(mode: InMode, t, x) -> tuple:
-    """Return distance and three rates of each surface, shape `(k, 4)`, and the rounding
-    error of the distance, `(k,)`, for a motion that does not slide.
+    """Return the distance of each surface and its first three derivatives, `(k, 4)`,
+    and the rounding error of the distance, `(k,)`, for a motion that does not slide.
     """
     side = OnSides(mode.system, mode.negative)
 
@@ -289,8 +289,8 @@ def hold_of(mode: InMode, t, x) -> Float[Array, "2 k"]:
     """Return how far the weight of the branch beyond each surface is outside its
     limits, which static friction widens, and this weight.
 
-    It is negative inside, infinite if no side drives the motion back, and -1 where the
-    motion does not slide.
+    The excess is negative inside the limits, infinite if no side drives the motion
+    back, and -1 where the motion does not slide.
     """
     terms = slide_terms(mode, t, x)
     found, slack = shares(mode, terms), slack_of_hold(mode)
@@ -304,8 +304,8 @@ def hold_of(mode: InMode, t, x) -> Float[Array, "2 k"]:
 
 
 def settled(mode: InMode, t, x) -> Float[Array, "rows n"]:
-    """Return the state moved onto the surfaces on which it slides, by one Newton step,
-    then the change of the field beyond each, zero where it does not slide.
+    """Return the state moved by one Newton step onto the surfaces on which the motion
+    slides, then the change of the field beyond each surface, zero without sliding.
 
     The state moves in the directions in which the field jumps, as it does over a short
     time of sliding: a velocity is corrected by the friction that holds it.

@@ -28,8 +28,8 @@ class CamContour(NamedTuple):
     radius_of_curvature: Float[Array, " angles"]
     """Radius of curvature (m), positive where the contour is convex."""
     pressure_angle: Float[Array, " angles"]
-    """Pressure angle (rad), between the contact force and the motion of the contact
-    point.
+    """Pressure angle (rad): the angle between the contact force and the motion of the
+    contact point.
     """
     arm: Float[Array, " angles"]
     """Lever arm of the contact force about the hinge (m); 1 for a translating
@@ -84,10 +84,9 @@ def flat_oscillating_contour(
     Args:
         profile: Angle of the follower (rad) as a function of the cam angle (rad).
         cam_angles: Cam angles (rad), shape `(angles,)`.
-        center: Position (x0, y0) of the cam axis relative to the hinge (m); known for
-            an [`jaxcam.models.EccentricCircle`][].
-        half_height: Distance of the face from the hinge (m); known for an
-            [`jaxcam.models.EccentricCircle`][].
+        center: Position (x0, y0) of the cam axis relative to the hinge (m); not
+            required for an [`jaxcam.models.EccentricCircle`][], which defines it.
+        half_height: Distance of the face from the hinge (m); as for `center`.
 
     Returns:
         The contour about the cam axis.
@@ -123,8 +122,8 @@ def flat_oscillating_contour(
 
         (point, arm), (rate, _) = jax.jvp(contact, (angle,), (jnp.ones_like(angle),))
         lift, slope, _ = _jet(profile, angle)
-        # the direction of the face, seen from the cam, turns with slope - 1, and the
-        # contact point moves along it against its rotation
+        # seen from the cam, the face rotates at the rate slope - 1, and the contact
+        # point moves along the face in the sense opposite to this rotation
         along = rate[0] * jnp.cos(lift - angle) + rate[1] * jnp.sin(lift - angle)
         pressure = jnp.arctan(half_height / arm)
         return CamContour(point[0], point[1], along / (1 - slope), pressure, arm)
@@ -222,7 +221,8 @@ def _roller(profile, center, direction, length, roller_radius, cam_angles):
         point = pitch(angle)
         first, second = jax.jvp(rate, (angle,), unit)
         size = jnp.hypot(first[0], first[1])
-        # in the frame of the cam, the follower moves clockwise: left is outside
+        # in the frame of the cam, the follower moves clockwise, so its left side is the
+        # outside
         outward = jnp.stack([-first[1], first[0]]) / size
         pitch_radius = size**3 / (first[1] * second[0] - first[0] * second[1])
         x, y = point - roller_radius * outward

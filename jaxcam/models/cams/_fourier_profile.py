@@ -48,11 +48,12 @@ class FourierProfile(CamProfile):
 
 
 def _sum(angle, mean, cosines, sines):
-    # Waves by their recurrence, unrolled in Python: inside a simulation's loop it must
-    # fuse into plain arithmetic, and the derivatives of a gap share the waves.
+    # The waves follow from a recurrence, which is unrolled in Python so that it fuses
+    # into plain arithmetic inside the loop of a simulation. The derivatives of a gap
+    # share the waves.
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     twice = 2 * cosine
-    # the mean is added last, because it is the largest and would round all other terms
+    # the mean is added last: it is the largest term, and adding to it rounds the others
     total = cosines[0] * cosine + sines[0] * sine
     before, now = (jnp.ones_like(cosine), jnp.zeros_like(sine)), (cosine, sine)
     for k in range(1, cosines.shape[-1]):
@@ -63,8 +64,9 @@ def _sum(angle, mean, cosines, sines):
 
 
 # The derivative of a series is also a series. A custom rule halves the total cost of
-# gap, velocity, acceleration and jerk compared with differentiating the recurrence. It
-# is traced once for each number of harmonics, because a simulation uses it many times.
+# gap, velocity, acceleration and jerk compared with differentiating the recurrence. The
+# rule is traced only once for each number of harmonics, because a simulation uses it
+# many times.
 _series = saving_jvp(_sum)
 
 

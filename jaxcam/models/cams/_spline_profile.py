@@ -10,7 +10,8 @@ from ._profile import CamProfile
 
 _TURN = 2 * np.pi
 _FEWEST_POINTS = 6
-# A quintic c0 + c1 u + ... + c5 u^5 from value, slope and curvature at 0 and at 1
+# Coefficients of a quintic c0 + c1 u + ... + c5 u^5, computed from its value, slope and
+# curvature at 0 and at 1
 _HERMITE = np.array(
     [
         [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -106,17 +107,19 @@ class PiecewiseProfile(CamProfile):
 
 @jax.jit
 def _quintic_pieces(widths, lifts):
-    # The unknowns are slope and curvature at each point. With them and the lifts each
-    # piece is a quintic Hermite polynomial, and continuity of the third and fourth
-    # derivative at each point are as many linear equations. Scaled by the mean width so
-    # that the equations are well balanced for tables of any length.
+    # The unknowns are the slope and the curvature at each point. Together with the
+    # lifts, they define each piece as a quintic Hermite polynomial. Continuity of the
+    # third and fourth derivatives at each point gives as many linear equations as there
+    # are unknowns. The widths are divided by their mean, so that the equations are well
+    # balanced for tables of any length.
     points = widths.shape[0]
     scale = _TURN / points
     h = widths / scale
     hermite = jnp.asarray(_HERMITE, dtype=widths.dtype)
     following = np.roll(np.arange(points), -1)
 
-    # value, h slope, h^2 curvature at both ends -> third and fourth derivative there
+    # from the value, h slope and h^2 curvature at both ends of a piece to the third and
+    # fourth derivatives at its start and at its end
     third = 6 * hermite[3], 6 * hermite[3] + 24 * hermite[4] + 60 * hermite[5]
     fourth = 24 * hermite[4], 24 * hermite[4] + 120 * hermite[5]
     powers = jnp.stack([jnp.ones_like(h), h, h**2] * 2, axis=-1)
@@ -126,7 +129,7 @@ def _quintic_pieces(widths, lifts):
     after, second = np.roll(here, 1, axis=1), np.roll(here, 2, axis=1)
     rows = []
     for derivative, order in ((third, 3), (fourth, 4)):
-        # at the end of piece i, minus at the start of piece i + 1, is zero
+        # the derivative at the end of piece i equals that at the start of piece i + 1
         weights = powers / h[:, None] ** order
         end = derivative[1][None] * weights
         begin = (derivative[0][None] * weights)[following]

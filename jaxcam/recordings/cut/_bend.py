@@ -46,7 +46,8 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 class Seen(NamedTuple):
     """Information of one recording on the coefficients of a surface, linearised.
 
-    `normal` `(p, p)` and `target` `(p,)`; the coefficients of a bend come last.
+    The normal equations have the matrix `normal`, shape `(p, p)`, and the right-hand
+    side `target`, shape `(p,)`; the coefficients of a bend come last.
     """
 
     normal: Float[np.ndarray, "p p"]
@@ -59,11 +60,12 @@ def bend_sizes(
     pull: Float[np.ndarray, " q"],
     noise: float,
 ) -> Float[np.ndarray, " waves"]:
-    """Return standard deviations of the coefficients of a bend; zero without a
-    significant bend.
+    """Return the prior standard deviations of the coefficients of a bend; zero if no
+    bend is significant.
 
-    **Arguments:** the information of each recording; information and pull of the
-    tolerances of the `q` coefficients that are not part of a bend; the noise.
+    **Arguments:** `records`: the information from each recording; `known`, `pull`: what
+    the tolerances of the `q` coefficients outside the bend add to the normal matrix and
+    to the right-hand side; `noise`: standard deviation of a sample.
     """
     none = np.zeros(WAVES)
     if len(records) < 2:
@@ -95,8 +97,8 @@ def _evidence(normal, target, known, pull, sizes) -> float:
 
 
 def _foretold(records, known, pull, sizes) -> float:
-    """Return the gain in twice the log-likelihood of each recording with the bend of
-    all others.
+    """Return the total gain in twice the log-likelihood if each recording is predicted
+    with the bend fitted to all others.
 
     The other coefficients are those fitted to all recordings.
     """
@@ -123,5 +125,5 @@ def _total(records: list[Seen]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _scaled(normal, units) -> np.ndarray:
-    """Return the information in units of the prior, including the prior."""
+    """Return the normal matrix, including the prior, in units of the prior."""
     return np.eye(len(units)) + normal * np.outer(units, units)

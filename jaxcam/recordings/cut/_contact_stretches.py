@@ -19,7 +19,7 @@ Span: TypeAlias = tuple[int, int]
 # Gaps in units of the noise: contact is possible below the first, and flight is certain
 # above the second
 LOW, HIGH = 4.0, 6.0
-# Seconds
+# Minimum duration of a contact (s)
 SHORTEST_CONTACT = 0.005
 # A stretch near the surface that is shorter than this (s) may be a grazing contact
 _GRAZE = 0.03
@@ -65,7 +65,7 @@ def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def overlap(one: Span, other: Span) -> bool:
-    """Return whether two stretches are closer than the shortest flight."""
+    """Return whether two stretches overlap or are closer than the shortest flight."""
     margin = SHORTEST_FLIGHT
     return one[0] - margin < other[1] and other[0] < one[1] + margin
 

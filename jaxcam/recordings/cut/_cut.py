@@ -23,8 +23,9 @@ from ._release import release_time
 from ._segments import Boundary, Contact, Flight, Impacts
 
 
-# Standard errors by which a motion must recede from a surface for an impact to be
-# rejected, or continue into it for several impacts
+# Standard errors by which a motion must recede from a surface before a supposed impact
+# to reject the latter, or approach the surface after an impact to assume several
+# impacts
 _SURE = 3.0
 # Samples of a flight before an impact needed to determine its curvature
 _LONG = 10
@@ -41,11 +42,12 @@ def cut(
     **Arguments:**
 
     - `sides`: the motion relative to each surface, with a positive gap; it is
-      `mirrored` for a surface above the motion, and the distance for a moving body.
+      `mirrored` for a surface above the motion, and for a moving body it is the
+      distance from that body.
     - `restitution`: expected value, for impacts too weak to be observed.
     - `doubted`: stretches of samples that a model of the flight does not describe; a
         less significant impact is sought there, and a flight that follows contact
-        begins at its last sample near the surface.
+        begins at the last sample near the surface.
     """
     motion = sides[0]
     resting, doubtful, marks = _places(sides, doubted)
@@ -128,7 +130,8 @@ def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
     for number, side in enumerate(sides):
         found, unsure = contact_stretches(side)
         for mark in impact_marks(side, found, doubted):
-            # next to a jump, the windows show jumps of the opposite sign
+            # next to a jump, the comparison of windows shows spurious jumps of opposite
+            # sign
             near = side.gap[mark - 1 : mark + 1]
             if number in nearest[mark - 1 : mark + 1] and np.min(near) < _reach(side):
                 marks[mark] = number
@@ -246,10 +249,11 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
 
 
 def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
-    """Return the release, unless the follower may still be bouncing then.
+    """Return the release, or a later boundary if the follower may still be bouncing
+    then.
 
     The rebounds of a low flight that ends on a receding surface are too low to be
-    observed. The next flight begins at `latest` (s) in any case.
+    observed. The next flight begins no later than `latest` (s).
     """
     if landing is None or landing.kind != "landing":
         return release
@@ -263,7 +267,8 @@ def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary
 def _still_near(time: float, latest: float) -> Boundary:
     """Return the end of a contact that continues while the motion is near the surface.
 
-    A release would begin a flight that a model of it does not describe.
+    If this end were a release, it would begin a flight that the model does not
+    describe.
     """
     evidence = "flights too low to be observed may last until here"
     return Boundary(min(time, latest), WINDOW / 2, "impact", evidence)
@@ -279,7 +284,8 @@ def _flight(sides, span, boundaries, left: set[int], doubted) -> Flight:
     start = start if first == span[0] else _end(motion, min(first, last - 1), hidden)
     stop = stop if last == span[1] else _end(motion, last - 1, hidden)
     height = float(np.max(motion.gap[first:last], initial=0.0))
-    # the threshold is exceeded long after release: these samples belong to the flight
+    # the gap exceeds the threshold only long after release; the samples until then
+    # belong to the flight
     begin = int(np.searchsorted(motion.time, start.time))
     first = begin if span[0] in left and start is boundaries[span[0]] else first
     return Flight(start, stop, first, last, height)

@@ -58,7 +58,7 @@ def firm_contact(
     found[half : len(samples) - half] = smooth & (held > most + error)
     firm = np.zeros(len(samples), dtype=bool)
     for first, last in stretches(found):
-        # preceding flights may be too low to be observed
+        # omit the beginning, because preceding flights may be too low to be observed
         if (last - first) * recording.interval >= _LASTS:
             firm[first + half : last] = True
     return firm

@@ -2,7 +2,7 @@
 
 Just above the valve-float speed, the follower lifts by a few times the noise once per
 turn. Samples of such a flight resemble contact. The rig file determines, within its
-tolerances, the phases of small contact force at which this may happen.
+tolerances, the phases of small contact force at which such flights are possible.
 """
 
 import dataclasses
@@ -127,8 +127,8 @@ def sure_contact(
 def before_release(
     angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """For a contact truncated by the end of the recording, return the samples at which
-    it certainly continues: those before the phase of the releases elsewhere in the
+    """Return the samples at which a contact truncated by the end of the recording
+    certainly continues: those before the phase of the releases elsewhere in the
     recording, because a release just before the end is not observed.
 
     **Arguments:** the cam angle (rad), the first sample of the contact, and the samples

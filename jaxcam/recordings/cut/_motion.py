@@ -12,7 +12,8 @@ from ._polynomial import fit_local, LocalFit
 _FIT_WINDOW, _FEWEST = 0.1, 16
 # Residuals (in units of the noise) above which a cubic does not follow a stretch
 _FOLLOWED = 2.0
-# Standard errors of the next coefficient above which a cubic does not follow it either
+# Value of the next coefficient, in standard errors, above which a cubic does not follow
+# it either
 _NEXT = 2.0
 
 
@@ -44,7 +45,9 @@ class Motion:
         return self.samples - self.contact
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
-        """Fit a polynomial to one end of a flight, as far as a cubic follows it."""
+        """Fit a polynomial to one end of a flight, as far as a cubic can follow the
+        motion.
+        """
         # the samples next to an impact may belong to the other side
         inner = slice(first + 1, last - 1) if last - first > 6 else slice(first, last)
         count = max(4, round(_FIT_WINDOW / self.interval))
@@ -60,15 +63,15 @@ class Motion:
             count = shorter
 
     def _follows(self, fit: LocalFit, time, samples) -> bool:
-        """Return whether a polynomial of the next degree describes the samples no
-        better; its truncation would act mainly on the slope at the end.
+        """Return whether a fit describes the samples, and a further degree would not
+        improve it. An omitted degree would mainly distort the slope at the end.
         """
         off = samples - fit.values(time)
         degree = len(fit.coefficients)
         free = max(1, len(time) - degree)
         scale = max(float(np.max(np.abs(time - fit.origin))), np.finfo(float).tiny)
         powers = ((time - fit.origin) / scale)[:, None] ** np.arange(degree + 1)
-        # the component of the residuals along what the next power adds
+        # the component of the residuals in the direction that the next power adds
         added = np.linalg.qr(powers)[0][:, -1]
         if abs(float(added @ off)) > _NEXT * self.noise:
             return False

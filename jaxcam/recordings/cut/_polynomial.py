@@ -19,7 +19,7 @@ class LocalFit:
         return float(self._row(time) @ self.coefficients)
 
     def values(self, times: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Evaluate at many times."""
+        """Return the values of the polynomial at many times."""
         return np.polynomial.polynomial.polyval(times - self.origin, self.coefficients)
 
     def slope(self, time: float) -> float:
@@ -47,8 +47,8 @@ def fit_local(
     noise: float,
     origin: float,
 ) -> LocalFit:
-    """Fit by least squares, with a degree from one to three that depends on the number
-    of samples.
+    """Fit a polynomial by least squares, with a degree from one to three that depends
+    on the number of samples.
 
     **Arguments:**
 

@@ -1,4 +1,4 @@
-"""Find impacts near the ends of a recording, and impacts before it began."""
+"""Allow for impacts near the ends of a recording, and for impacts before it began."""
 
 import dataclasses
 
@@ -16,8 +16,8 @@ _LEAST = 12
 
 def clear_of_end(motion: Motion, span: Span) -> Span:
     """Return the part of a flight that is certainly before an impact at the end of the
-    recording, and after one at its beginning. That close to an end, an impact affects
-    too few samples to be detected, but it can be predicted by extrapolating the flight.
+    recording, and after one at its beginning. So close to an end, an impact affects too
+    few samples to be detected, but it can be predicted by extrapolating the flight.
     """
     first, last = span
     count = len(motion.time)

@@ -1,4 +1,6 @@
-"""Locate the release, which is so gradual that a threshold would always be late."""
+"""Locate the release, which is so gradual that a threshold would always detect it too
+late.
+"""
 
 import numpy as np
 from jaxtyping import Float
@@ -14,10 +16,11 @@ def release_time(
     """Return the time of release and its standard error (s), from the gap around it.
 
     At release, the free body has the position, velocity and acceleration of the
-    surface. It follows that parabola while the surface curves away, so the gap opens as
-    a cubic whose coefficient follows from the surface. Each sample is tried as the
-    release, and the one with the smallest sum of squares is used; the error is the
-    distance at which the sum has increased by the noise variance.
+    surface. It continues on the parabola defined by these values while the surface
+    curves away, so the gap opens as a cubic whose coefficient follows from the surface.
+    Each sample is tried as the release, and the one with the smallest sum of squares is
+    used; the error is the distance at which the sum has increased by the noise
+    variance.
 
     **Arguments:**
 

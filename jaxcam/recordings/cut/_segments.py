@@ -32,9 +32,9 @@ class Flight:
     """Free motion from one boundary to the next; samples `first <= i < last`."""
 
     start: Boundary
-    """The boundary at which it begins."""
+    """The boundary at which the flight begins."""
     stop: Boundary
-    """The boundary at which it ends."""
+    """The boundary at which the flight ends."""
     first: int
     """Index of the first sample."""
     last: int
@@ -56,9 +56,9 @@ class Contact:
     """
 
     start: Boundary
-    """The boundary at which it begins."""
+    """The boundary at which the contact begins."""
     stop: Boundary
-    """The boundary at which it ends."""
+    """The boundary at which the contact ends."""
     first: int
     """Index of the first sample."""
     last: int

@@ -18,7 +18,8 @@ from ._bend import WAVES, waves
 from ._padding import padded
 
 
-# Deviations of a cam from its geometry: run-out, bearings, a bent shaft (rad)
+# Orders and size (rad) of the harmonic deviations of a cam from its geometry, which are
+# due to run-out, bearings or a bent shaft
 _HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
 # Index at which the sines and the bend begin among the amplitudes

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 
-# Possible numbers of decimals of the times in a file
+# Maximum number of decimals that the times in a file may have
 _DIGITS = 9
 # Smallest number of samples to determine a clock
 _LEAST = 16

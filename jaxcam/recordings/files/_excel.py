@@ -23,7 +23,7 @@ def read_excel(file: Path, names: Sequence[str] | None = None) -> Source:
     """
     raw = read_bytes(file)
     try:
-        # pandas needs it for workbooks and reports its absence only on reading
+        # pandas needs openpyxl for workbooks and reports its absence only on reading
         import openpyxl  # noqa: F401 (only its absence matters)  # pyright: ignore
         import pandas as pd
     except ImportError:
@@ -64,7 +64,9 @@ def _cell(value: Any) -> str:
 
 
 def _refuse_bomb(file: Path, raw: bytes) -> None:
-    """Raise `RecordingError` for a file that is not an archive, or inflates too far."""
+    """Raise `RecordingError` for a file that is not an archive, or is too large when
+    decompressed.
+    """
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             size = sum(part.file_size for part in archive.infolist())

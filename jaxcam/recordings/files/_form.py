@@ -92,7 +92,7 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
         if all(map(is_unit, lower)):
             names, units = above, names
         elif any(map(is_time, upper)) and not any(map(is_time, lower)):
-            # text where the first row of numbers should be
+            # the first row of the table contains text instead of numbers
             return Form(separator, above, None, names)
     for k in range((names if units is None else units) + 1, first):
         cells = cells_of(lines[k], separator)
@@ -113,8 +113,9 @@ def _is_head(line: str, separator: str, width: int) -> bool:
 
 
 def _is_other(line: str, separator: str, width: int) -> bool:
-    """Return whether a line names the columns of rows with different separators. With
-    spaces, empty cells are lost; with commas, decimal commas split numbers.
+    """Return whether a line contains the names of the columns although its number of
+    cells differs from that of the rows. With spaces, rows lose their empty cells; with
+    commas, decimal commas split their numbers.
     """
     count = len(cells_of(line, separator))
     lost = separator == " " and count > width
@@ -123,8 +124,8 @@ def _is_other(line: str, separator: str, width: int) -> bool:
 
 
 def _is_any_head(lines: Sequence[str], place: int, separator: str) -> bool:
-    """Return whether the line above the rows contains names, possibly a different
-    number.
+    """Return whether the line above the rows contains names, even if their number
+    differs from that of the columns.
     """
     if place < 0 or separator == " ":
         return False

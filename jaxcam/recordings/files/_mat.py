@@ -17,18 +17,20 @@ from ._source import Source
 
 
 _HDF5 = b"\x89HDF"
-# of a compressed element of a MATLAB file, and where the first element is
+# type code of a compressed element of a MATLAB file, and position of the first element
 _COMPRESSED, _HEADER = 15, 128
-# maximum depth of nested structures, and number of series in one array, searched
+# maximum depth of nested structures that are searched, and maximum number of series in
+# one array
 _DEEPEST, _MOST_SERIES = 8, 300
 
 
 def read_mat(file: Path) -> Source:
     """Return the vectors of a MATLAB file (up to version 7.2) by name.
 
-    A vector in nested structures has a dotted name, `run.left.angle_rad`, and also its
-    last word as a name if that is unique. Entries of an array of structures are
-    numbered from 1, as are series side by side in one array, along its longest axis:
+    A vector in nested structures can be addressed by a dotted name, such as
+    `run.left.angle_rad`, or by the last word of that name if this word is unique. The
+    entries of an array of structures are numbered from 1. The series in an array with
+    several axes extend along its longest axis and are numbered in the same way:
     `marker.3`. Other data are ignored.
 
     **Raises:** `RecordingError` if the file is not a MATLAB file, or contains no
@@ -64,7 +66,7 @@ def _is_time(name: str) -> bool:
 def _vectors(
     name: str, value: Any, depth: int
 ) -> Iterator[tuple[str, Float[np.ndarray, " k"]]]:
-    """Return the vectors in a variable, by dotted names."""
+    """Yield each vector in a variable, with its dotted name."""
     fields = getattr(value, "_fieldnames", None)
     if fields is not None and depth:
         for field in fields:
@@ -102,7 +104,7 @@ def _loaded(file: Path) -> dict[str, Any]:
     _refuse_bomb(file, raw)
     try:
         with warnings.catch_warnings():
-            # variables of the same name, and other warnings of loadmat
+            # loadmat only warns of faults such as several variables with the same name
             warnings.simplefilter("error")
             return loadmat(io.BytesIO(raw), squeeze_me=True, struct_as_record=False)
     except Exception:

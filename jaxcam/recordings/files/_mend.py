@@ -76,7 +76,7 @@ def _unslipped(
 ) -> Float[np.ndarray, " k"]:
     samples = recording.channels[name]
     steps = np.diff(samples)
-    # change of the angle between two samples, from the neighbouring samples
+    # usual change of the angle between two samples
     usual = np.median(steps)
     turns = np.round((steps - usual) / (2 * np.pi))
     # the drive keeps turning across a gap at which the recording is split

@@ -23,14 +23,14 @@ def qtm_heading(
     markers = [re.sub(r"\W+", "_", name) for name in fields["MARKER_NAMES"]]
     axes = [f"{name}_{axis}_mm" for name in markers for axis in "xyz"]
     if width == len(axes) + 2:
-        # the option to write frame and time
+        # the file was written with the option to include frame and time
         return ["frame", "time_s", *axes], None
     rate = fields["FREQUENCY"]
     return axes, float(rate[0].replace(",", ".")) if rate else None
 
 
 def without_lost(columns: dict[str, pd.Series]) -> dict[str, pd.Series]:
-    """Return the columns with lost markers, which are written as 0 0 0, left empty."""
+    """Return the columns with empty cells for lost markers (written as 0 0 0)."""
     found = dict(columns)
     for name in columns:
         if not name.endswith("_x_mm"):

@@ -129,7 +129,8 @@ def _bodies(file: Path, found: dict, columns: dict) -> Bodies:
 
 
 def _speeds(file: Path, before, after, signed: bool):
-    """Return approach and separation speeds of relative velocities, or of magnitudes.
+    """Return approach and separation speeds, from relative velocities or from
+    magnitudes.
 
     **Raises:** `RecordingError`, which names a row without an approach or without an
     impact.

@@ -90,7 +90,8 @@ def _decoded(file: Path, raw: bytes) -> str:
     except UnicodeDecodeError:
         pass
     try:
-        # a degree or micro sign from a Western Windows system
+        # the file may come from a Western Windows system and contain a degree or micro
+        # sign
         text = raw.decode("cp1252") if not raw.startswith(_UTF16) else "\0"
     except UnicodeDecodeError:
         text = "\0"
@@ -106,7 +107,7 @@ def _unquoted(lines: list[str]) -> list[str]:
     """Convert lines of quoted cells to lines separated by tabs."""
     if '"' not in lines[-1] or any(line.count('"') % 2 for line in lines):
         return lines
-    # between the quotes of the last line, which contains numbers
+    # the separator is next to the quotes in the last line, which contains numbers
     mark = next((m for m in "\t;," if f'"{m}' in lines[-1] or f'{m}"' in lines[-1]), "")
     if not mark:
         return lines

@@ -69,7 +69,8 @@ def _ordered(group, impacts, turns, fingerprint, starts):
     """Return numbers that do not depend on the order of motions."""
     found = group >= 0
     used = np.unique(group[found])
-    # the smallest start of each group; starts do not depend on their order
+    # the motion with the smallest start represents its group, whatever the order of
+    # motions
     order = np.lexsort((*starts.T[::-1], group))
     order = order[found[order]]
     first = order[np.searchsorted(group[order], used)]

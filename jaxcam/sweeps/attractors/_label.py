@@ -16,7 +16,8 @@ STICKING, CONTACT, UNCOUNTED = -1, -2, -3
 counted.
 """
 
-# required steadiness of the distances within an orbit
+# points count as still approaching each other if the largest of their last distances is
+# less than this fraction of the largest of their first distances
 _STEADY = 0.9
 
 
@@ -64,7 +65,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     for n in range(1, keep // 2 + 1):
         if not len(left):
             break
-        # most motions are distinguished by their last points
+        # for most motions, the last points suffice to exclude this period
         last = np.abs(states[left, -1] - states[left, -1 - n]) <= room[left, -1]
         likely = left[np.all(last, axis=1)]
         gone = np.abs(states[likely, n:] - states[likely, :-n])
@@ -78,7 +79,9 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
 
 
 def _still_nearing(states, n: int) -> np.ndarray:
-    """Return whether points one period apart still approach each other."""
+    """Return whether points that are a fraction of the period apart still approach each
+    other.
+    """
     nearing = np.zeros(len(states), dtype=bool)
     for part in range(1, n):
         if n % part:

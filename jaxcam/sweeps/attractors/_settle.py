@@ -1,4 +1,4 @@
-"""Run motions until they repeat, or to a limit."""
+"""Run motions until they repeat, or up to a time limit."""
 
 from collections.abc import Callable
 

@@ -1,8 +1,8 @@
 """Store a sweep on disk as a plain Zarr group, which xarray can open.
 
-Besides the data it has `checksum(block)`: the CRC-32 of each finished block, -1 for an
-unfinished block. It is written after the data, so that interrupted, lost or damaged
-blocks are detected.
+In addition to the data, the group contains the array `checksum(block)`: the CRC-32 of
+each finished block, or -1 for an unfinished block. The checksum of a block is written
+after its data, so that interrupted, lost or damaged blocks are detected.
 """
 
 import shutil
@@ -69,17 +69,17 @@ class OnDisk:
         for name in extra.variables:
             if (self.path / str(name)).exists():
                 shutil.rmtree(self.path / str(name))
-        # attributes of the group are replaced by those of what is added
+        # `to_zarr` replaces the attributes of the group by those of the added dataset
         attributes = {k: v for k, v in self._group.attrs.items() if k != TOGETHER}
         extra = extra.assign_attrs(attributes)
         extra.to_zarr(self.path, mode="a", consolidated=False, zarr_format=3)
-        # last, so that an incomplete block is detected
+        # written last, so that incomplete results are detected
         group = zarr.open_group(str(self.path), mode="r+")
         group.attrs[TOGETHER] = checksums(extra, extra.variables)
 
     def _create(self) -> None:
         layout = self.layout
-        # in a temporary file next to it until it is complete
+        # in a temporary folder next to the final one until the group is complete
         fresh = self.path.with_name(self.path.name + ".new")
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.parent.mkdir(parents=True, exist_ok=True)

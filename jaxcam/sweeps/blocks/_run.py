@@ -107,7 +107,8 @@ def run_blocks(
     workers = 1 if job.chained else workers
     own = ThreadPoolExecutor(workers) if executor is None else nullcontext(executor)
     with own as pool:
-        # enough blocks that no worker waits for the next one, but not many
+        # enough blocks in progress that no worker has to wait for the next one, but not
+        # many more
         width = 2 * (getattr(pool, "_max_workers", None) or _workers_of(pool))
         if job.chained:
             width = 1

@@ -1,4 +1,6 @@
-"""Check initial states of a hybrid system, and compute default starts."""
+"""Run batches of motions of a hybrid system, check their initial states, and compute
+default ones.
+"""
 
 import sys
 from collections.abc import Callable
@@ -28,7 +30,9 @@ from ._samples import BEHIND
 
 
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
-"""Numbers of motions that advance together, for upper limits of the total number."""
+"""Pairs of an upper limit of the total number of motions, and the number of motions
+that then advance together.
+"""
 
 
 class Rows(NamedTuple):
@@ -54,7 +58,7 @@ def smallest_gaps(
 ):
     """Return the smallest gap of each state at `t0`, shape `(motions,)`.
 
-    `room` times its resolution is added to each gap.
+    To each gap, `room` times the resolution of the gap is added.
     """
     batched, shared = split_lanes(as_arrays(system), where, values)
     parts = jnp.asarray(t0, float), _rows(states), jnp.asarray(room, float)
@@ -180,7 +184,7 @@ def run_tables(section, rows: "Rows", states, turns, where, values, watched=None
         The table, `(motions, places, columns)`; impacts and codes of the motions.
     """
     rows.settings.check()
-    # states its error if there is no period
+    # raises an error if there is no period
     section.turn(where, values)
     _check_first(section, rows.settings, states, where, values)
     system, chosen = (section.system, where) if watched is None else watched
@@ -203,7 +207,9 @@ def run_tables(section, rows: "Rows", states, turns, where, values, watched=None
 
 
 def _check_first(section, settings, states, where, values) -> None:
-    """Raise `ValueError` for the system of the first motion with a finite state."""
+    """Raise `ValueError` if the system of the first motion with a finite state is
+    invalid.
+    """
     finite = np.flatnonzero(np.isfinite(states).all(axis=1))
     if not len(finite):
         return

@@ -15,7 +15,7 @@ from ._system_section import AbstractSystemSection
 
 
 class ImpactSection(AbstractSystemSection):
-    """Impact section: states just after each impact, with its time.
+    """Impact section: the state just after each impact, and the time of the impact.
 
     A chatter sequence is listed up to the impact after which it is completed
     analytically; set `Settings(chatter_depth=...)` to list more.

@@ -1,4 +1,4 @@
-"""Figure 1.2: impacts and sticking of the orbit with complete chatter, 152.65 rpm."""
+"""Figure 1.2: impacts and sticking of the orbit with complete chatter at 152.65 rpm."""
 
 import numpy as np
 from matplotlib.figure import Figure

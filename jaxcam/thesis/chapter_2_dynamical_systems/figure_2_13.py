@@ -1,5 +1,5 @@
-"""Figure 2.13 and thesis, eq. (2.43): the Zeno ball by event detection and
-time-stepping.
+"""Figure 2.13 and eq. (2.43) of the thesis: the bouncing ball, simulated with event
+detection and by time-stepping.
 
 The thesis gives the formula; the parameters of the ball are ours.
 """
@@ -22,14 +22,12 @@ from ..target import Rows, Target
 
 _BALL = BouncingBall(jnp.asarray(9.81), jnp.asarray(0.7))
 _LAUNCH = 1.0
-# numbers of steps over which an error is averaged, relative to the middle one
+# numbers of steps over which an error is averaged, relative to the nominal number
 _NEIGHBOURS = (0.92, 0.96, 1.0, 1.04, 1.08)
 
 
 class Zeno(NamedTuple):
-    """The bouncing ball up to contact, with event detection and with three step
-    lengths.
-    """
+    """The bouncing ball up to contact, with event detection and five step lengths."""
 
     exact: float
     """Accumulation time (thesis, eq. (2.43))."""
@@ -126,5 +124,5 @@ def draw(system: CamFollower) -> Figure:
 
 
 TARGET = Target(
-    "A bouncing ball, by event detection and by time-stepping", compute, draw
+    "A bouncing ball, simulated by event detection and by time-stepping", compute, draw
 )

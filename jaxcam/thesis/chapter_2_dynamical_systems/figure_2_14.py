@@ -1,4 +1,5 @@
-"""Figure 2.14 (d): a branch in the belt speed, with its sliding bifurcations.
+"""Figure 2.14 (d): a branch of orbits as a function of the belt speed, with its sliding
+bifurcations.
 
 The figure is a sketch; the parameters of the oscillator are ours.
 """
@@ -34,8 +35,9 @@ class Belted(NamedTuple):
 
     belt: float
     highest: float
-    """Largest velocity; fraction of the period spent sticking."""
+    """Largest velocity."""
     stuck: float
+    """Fraction of the period spent sticking."""
     crossings: int
     """Number of surface crossings without sticking."""
     run: Trajectory
@@ -62,7 +64,9 @@ def _switches(run: Trajectory) -> Switches:
 
 @cache
 def belt_branch() -> list[Belted]:
-    """Compute motions at decreasing belt speeds, each from the previous one."""
+    """Compute motions at decreasing belt speeds, each from the final state of the
+    previous one.
+    """
     made, state = [], (0.0, 0.0)
     for belt in counted("simulating belt speed", _BELTS[::-1]):
         made.append(belted(belt, state))
@@ -75,7 +79,9 @@ class SlidingEvent(NamedTuple):
 
     belt: float
     beyond: float
-    """Rate at which the field beyond the surface leaves it, where the orbit arrives."""
+    """Rate of change of the slip velocity along the field beyond the surface, at the
+    point where the orbit arrives; zero if that field is tangent to the surface.
+    """
 
 
 def _sticks(one: Belted) -> bool:
@@ -87,7 +93,9 @@ def _crosses(one: Belted) -> bool:
 
 
 def _between(holds, first: Belted, second: Belted) -> float:
-    """Find by bisection the speed between two motions at which a property is lost."""
+    """Return the belt speed between two motions at which a property is lost, found by
+    bisection.
+    """
     inside, outside = first.belt, second.belt
     state = tuple(np.asarray(second.run.final))
     for _ in counted("bisecting the belt speed, step", range(24)):
@@ -102,9 +110,9 @@ def sliding_events() -> dict[str, SlidingEvent]:
     """Return the events of the branch, from a fast belt to a slow one, by bisection.
 
     Grazing-sliding: the motion touches the surface and begins to slide there.
-    Switching-sliding: the motion begins to cross before it slides.
+    Switching-sliding: the motion begins to cross the surface before it slides.
     Crossing-sliding: the other crossing gains, or loses, a sliding segment.
-    At the last two the field beyond the surface is tangent to it.
+    At the last two events, the field beyond the surface is tangent to the surface.
     """
     branch = belt_branch()
     pairs = list(zip(branch[:-1], branch[1:], strict=True))
@@ -122,14 +130,14 @@ def sliding_events() -> dict[str, SlidingEvent]:
 
 
 def _rate_beyond(belt: float, name: str) -> float:
-    """Return the rate at the event: from below for switching, from above for
-    crossing.
+    """Return `SlidingEvent.beyond` for an event; the orbit arrives from below at a
+    switching-sliding event and from above at a crossing-sliding event.
     """
     side = {"switching-sliding": -1, "crossing-sliding": 1}.get(name)
     if side is None or not np.isfinite(belt):
         return np.nan
     switches = _switches(belted(belt, turns=2 * _SETTLE).run)
-    # it arrives from this side
+    # the orbit arrives at the surface from this side
     arrives = np.asarray(switches.kind) != SwitchKind.LEAVES
     from_side = np.asarray(switches.direction) == -side
     k = int(np.flatnonzero(arrives & from_side)[0])
@@ -139,7 +147,7 @@ def _rate_beyond(belt: float, name: str) -> float:
 
 
 def grazing_in_closed_form() -> float:
-    """Return the belt speed just reached by the motion without sticking.
+    """Return the belt speed that the motion without sticking just reaches.
 
     Friction is constant while the mass is slower than the belt, so the motion is
     harmonic about a shifted equilibrium.
@@ -168,7 +176,7 @@ def compute(system: CamFollower) -> Rows:
         one = min(belt_branch(), key=lambda b: abs(b.belt - belt))
         words = f"belt {one.belt:.3g}"
         rows.append(
-            (f"{words}: fraction of the period that sticks", np.nan, one.stuck, "")
+            (f"{words}: fraction of the period spent sticking", np.nan, one.stuck, "")
         )
         rows.append((f"{words}: crossings per period", np.nan, one.crossings, ""))
     return rows

@@ -1,4 +1,4 @@
-"""Figure 2.4 and thesis, eq. (2.17): the Feigenbaum ratio of the period-doubling
+"""Figure 2.4 and eq. (2.17) of the thesis: the Feigenbaum ratio of the period-doubling
 cascade.
 """
 
@@ -13,7 +13,7 @@ from ..target import Rows, Target
 
 
 FEIGENBAUM = 4.669
-"""(2.17)."""
+"""Feigenbaum ratio as printed in eq. (2.17) of the thesis."""
 
 
 def compute(system: CamFollower) -> Rows:

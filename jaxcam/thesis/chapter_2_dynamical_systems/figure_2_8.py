@@ -1,6 +1,7 @@
 """Figure 2.8: a saddle, in closed form and numerically, with its multipliers.
 
-The figure is a sketch of a flow; this one shows an impact oscillator.
+The printed figure is a sketch of a flow; the figure drawn here is that of an impact
+oscillator.
 """
 
 from functools import cache
@@ -38,7 +39,7 @@ class Strobe(eqx.Module):
 
 
 class BackwardStrobe(eqx.Module):
-    """Its inverse: the motion in reversed time."""
+    """The inverse of the stroboscopic map: the motion in reversed time."""
 
     system: ImpactOscillator
 
@@ -60,8 +61,10 @@ class Manifolds(NamedTuple):
 def manifolds() -> Manifolds:
     """Return the manifolds of the saddle that a fold of P(1,1) creates.
 
-    With V the speed before the impact, (k^2 + m^2) V^2 + 2 k sigma V + sigma^2 -
-    gamma^2 = 0 for orbits with one impact per period; the saddle has the smaller V.
+    For orbits with one impact per period, the speed V before the impact satisfies (k^2
+    + m^2) V^2 + 2 k sigma V + sigma^2 - gamma^2 = 0, where sigma is the position of the
+    wall and gamma the amplitude of the forced motion (k and m are defined in the code);
+    the saddle has the smaller V.
     """
     r, period = _RESTITUTION, 2 * np.pi / _OMEGA
     gamma = 1 / (1 - _OMEGA**2)

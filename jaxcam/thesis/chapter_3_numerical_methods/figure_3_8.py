@@ -34,8 +34,8 @@ from .figure_3_11 import periodic_run
 
 _RANGE = (138.0, 153.5)
 _NEAR_FOLD, _BEYOND = 12, 0.1
-"""Points below that, and by how much the sum of the multipliers exceeds its value at
-the fold.
+"""Number of points computed around the fold, and amount by which the sum of the
+multipliers at the last of them exceeds its value at the fold.
 """
 
 

@@ -1,5 +1,5 @@
-"""Figure 3.9: the start of the P(inf,1) branch, and where its sticking time
-vanishes.
+"""Figure 3.9: the start of the P(inf,1) branch, and the speed at which its sticking
+time vanishes.
 """
 
 from typing import TYPE_CHECKING

@@ -25,7 +25,8 @@ def _speeds(ends: tuple[float, float], step: float) -> np.ndarray:
 
 @remembered
 def experiment(system: CamFollower, size: str) -> tuple[sweeps.Diagram, sweeps.Diagram]:
-    """Simulate both sweeps: up from contact, and down from the end of the first.
+    """Simulate both sweeps: the upward one from contact, and the downward one from the
+    final state of the upward one.
 
     At each speed the cam turns for a minute; the motion is then sampled once per period
     for ten seconds, and continues at the next speed.

@@ -1,4 +1,5 @@
-"""Figure 4.15: restitution against speed, compared with what Table 5.2 implies.
+"""Figure 4.15: restitution against speed, compared with the values that Table 5.2
+implies.
 
 The thesis does not print the line itself; the product of the two multipliers of an
 orbit with one impact is r^2.

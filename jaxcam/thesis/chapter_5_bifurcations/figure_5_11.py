@@ -21,7 +21,9 @@ _ZOOMED = {"default": 401, "full": 2001}
 
 @remembered
 def onset(system: CamFollower, size: str) -> sweeps.Diagram:
-    """Compute the diagram of Figure 5.11, each speed from contact at rest."""
+    """Compute the diagram of Figure 5.11; the motion at each speed starts from contact
+    at rest.
+    """
     low, high = (beside_interruption(system, rpm) for rpm in _ZOOM)
     speeds = np.linspace(low, high, _ZOOMED[size])
     return sweeps.diagram(

@@ -39,8 +39,8 @@ def sticking_times(system: CamFollower) -> tuple[np.ndarray, np.ndarray, float]:
     """Return speeds (rpm) up to the interruption, sticking times (s) and the
     interruption.
 
-    Sticking times are exact however short; distances to the interruption are spaced
-    logarithmically.
+    Sticking times are exact, however short they are; the distances of the speeds from
+    the interruption are spaced logarithmically.
     """
     end = float(rad_s_to_rpm(interruption(system).speed))
     speeds = end - np.geomspace(20.0, 1e-5, 120)

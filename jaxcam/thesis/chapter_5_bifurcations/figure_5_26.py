@@ -71,7 +71,7 @@ def compute(system: CamFollower) -> Rows:
 
 
 def _map_with_identity(ax, fitted, shift, low, high) -> None:
-    # dense at every corner, where the slope is infinite
+    # equal steps in the cube root of the distance from x_0, where the slope is infinite
     x = float(fitted.x_0) - (float(fitted.x_0) - low) * np.linspace(0, 1, 6001) ** 3
     value = np.asarray(fitted(jnp.asarray(x)))
     shown = (x > low) & (x < high)

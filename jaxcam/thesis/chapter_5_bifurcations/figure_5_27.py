@@ -1,7 +1,8 @@
-"""Figure 5.27: corners of the lobes, from thesis, eq. (5.4), with Table 5.3, and
-simulated.
+"""Figure 5.27: corners of the lobes, computed from eq. (5.4) of the thesis with Table
+5.3, and simulated.
 
-Distances are from x_0, since the printed map has another offset (docs/chatter.md).
+Distances are measured from x_0, because the printed map has another offset
+(docs/chatter.md).
 """
 
 import jax.numpy as jnp

@@ -34,20 +34,23 @@ class Iterated(NamedTuple):
     """Figure 5.28: the fitted map and the motion, both from the sticking state."""
 
     speeds: np.ndarray
-    """(k,) rpm; (k, kept) rad."""
+    """Speeds (rpm) at which the map is iterated, shape `(k,)`."""
     attractor: np.ndarray
+    """Iterates of the map (rad), shape `(k, kept)`."""
     motion_speeds: np.ndarray
+    """Speeds (rpm) at which the motion is simulated, shape `(l,)`."""
     motion: np.ndarray
+    """Samples of the motion (rad), shape `(l, kept)`."""
     rate: float
     """Shift of the map per unit of speed (rad/rpm)."""
     interruption: float
-    """rpm."""
+    """Speed of the interruption of chatter (rpm)."""
 
 
 @remembered
 def iterated(system: CamFollower, size: str) -> Iterated:
     """Iterate the map along the direction in which motions leave the lobes, and
-    simulate.
+    simulate the motion.
     """
     rig = interruption(system)
     composed = composed_map(rig, speed_of, _RANK)

@@ -34,8 +34,8 @@ def impact_speeds(system: CamFollower) -> list[float]:
 
 @remembered
 def impacts_at(system: CamFollower) -> sweeps.Diagram:
-    """Return the impacts of Figure 5.9, from contact at rest, resolved deep into
-    chatter.
+    """Return the impacts of Figure 5.9, which are resolved deep into the chatter; the
+    motions start from contact at rest.
     """
     section = sweeps.ImpactSection(
         system, settings=Settings(tolerance=1e-9, chatter_depth=1e-4)

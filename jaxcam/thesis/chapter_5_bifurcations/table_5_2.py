@@ -51,7 +51,8 @@ NEAR_FOLD = SPEEDS < 140.0
 """Rows close to the fold, where the multipliers depend strongly on the speed."""
 
 
-# Section 5.2.1: fold of P(1,1), and its flip ("close to")
+# Section 5.2.1: fold of P(1,1), and its flip, which the text gives as "close to" this
+# speed
 FOLD_SPEED = 135.946
 FLIP_SPEED = 152.0
 

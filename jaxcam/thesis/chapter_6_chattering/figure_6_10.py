@@ -1,4 +1,4 @@
-"""Figure 6.10: the chatter of the orbit at 152.67 rpm, closer."""
+"""Figure 6.10: the chatter of the orbit at 152.67 rpm, enlarged."""
 
 from matplotlib.figure import Figure
 

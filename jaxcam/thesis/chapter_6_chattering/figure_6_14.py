@@ -14,7 +14,7 @@ from .rebuilt import composed_at, draw_rebuilt, lobe_rows, Rebuilt
 
 @remembered
 def rebuilt_state(system: CamFollower) -> Rebuilt:
-    """Compute Figure 6.14, in which the rebound speed of D* is changed."""
+    """Compute the data of Figure 6.14, in which the rebound speed of D* is changed."""
     rig, composed = composed_at(system, late=False)
     bar = float(composed.lambda_bar)
     lam = np.linspace(0.85 * bar, 0.40, 400)

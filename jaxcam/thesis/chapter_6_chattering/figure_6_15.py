@@ -1,7 +1,7 @@
 """Figure 6.15: prediction and simulation after a change of speed.
 
 Below the interruption the motion depends on the speed only through the release; the
-slopes are those of Table 6.3, here from simulations.
+slopes are those of Table 6.3, here computed from simulations.
 """
 
 import jax.numpy as jnp
@@ -24,7 +24,7 @@ _CHANGE = 0.001 * 152.67
 
 @remembered
 def rebuilt_parameter(system: CamFollower) -> Rebuilt:
-    """Compute Figure 6.15, in which the cam speed (rpm) is changed."""
+    """Compute the data of Figure 6.15, in which the cam speed (rpm) is changed."""
     rig, composed = composed_at(system, late=True)
     change = np.linspace(-_CHANGE, _CHANGE, 401)
     rates = jnp.asarray(rpm_to_rad_s(change))

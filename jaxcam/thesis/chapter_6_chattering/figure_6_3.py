@@ -23,8 +23,8 @@ from .manifold import manifold_of
 
 
 _UNDER = 1 - 1e-11
-"""Reduction of the initial speed that turns grazing into an impact above rounding;
-the impact speed grows with the square root of the reduction.
+"""Reduction of the initial speed that turns grazing into an impact well above rounding
+error; the impact speed grows with the square root of the reduction.
 """
 
 
@@ -103,7 +103,7 @@ def draw(system: CamFollower) -> Figure:
         ax.plot(hit, np.zeros_like(hit), ".", color=IMPACT, ms=5)
         ax.axhline(0, color="0.4", lw=0.7)
         ax.set_title(one.name, fontsize=11)
-        # the long flight after grazing would hide it
+        # the long flight after grazing would make the rest too small to be seen
         last = 1.25 * (one.until - start)
         near = drawn.time - start <= one.until - start
         top = 1.25 * np.nanmax(drawn.gap[near])

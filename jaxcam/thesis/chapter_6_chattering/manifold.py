@@ -90,7 +90,9 @@ def manifold_rows(system: CamFollower, branches: int) -> Rows:
 
 
 def draw_manifold(found: Manifold, most: float | None) -> Figure:
-    """Draw both in the plane of time and rebound speed, up to the speed `most`."""
+    """Draw the manifold and the region in the plane of time and rebound speed, up to
+    `most`.
+    """
     figure, ax = plt.subplots(figsize=(7.8, 5.2))
     period = float(found.system.period)
     plotting.chattering_picture(

@@ -68,7 +68,7 @@ def _cam_velocity(run, times):
 
 
 def draw_marks(system: CamFollower, close: bool = False) -> Figure:
-    """Draw the orbit with its marks; `close`: around the end of its chatter."""
+    """Draw the orbit with its marks; with `close`, only near the end of its chatter."""
     drawn, gap, rate, times, gaps, rates, period = _marked(system)
     gap, gaps = 1e3 * gap, 1e3 * gaps
     figure = plt.figure(figsize=(9.6, 5.2))
@@ -96,7 +96,7 @@ def draw_marks(system: CamFollower, close: bool = False) -> Figure:
     right.set_xlabel("gap (mrad)")
     right.set_ylabel("velocity (rad/s)")
     top.tick_params(labelbottom=False)
-    # the section is at the end of the period, and its mark is wider
+    # leave room for the mark of the section, which is at the end of the period
     top.set_xlim(0, 1.02 * period)
     top.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     if close:

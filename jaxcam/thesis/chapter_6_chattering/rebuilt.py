@@ -1,4 +1,4 @@
-"""Compute the state at the section after a deviation, by composed map and by
+"""Compute the state at the section after a deviation, by the composed map and by
 simulation.
 """
 

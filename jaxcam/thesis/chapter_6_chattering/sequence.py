@@ -20,15 +20,16 @@ class ChatterSequence(NamedTuple):
     system: CamFollower
     frame: ChatterFrame
     tau: np.ndarray
-    """(k,) times from release (s) and rebound speeds (rad/s)."""
+    """Times of the impacts, measured from release (s), shape `(k,)`."""
     speed: np.ndarray
+    """Rebound speeds (rad/s), shape `(k,)`."""
     accumulation: float
-    """Time from release (s)."""
+    """Accumulation time, measured from release (s)."""
 
 
 @remembered
 def sequence(system: CamFollower) -> ChatterSequence:
-    """Return the impacts at the distance of Table 6.1 below the interruption."""
+    """Return the impacts at a speed as far below the interruption as in Table 6.1."""
     rig = reference(system)
     orbit = accumulation_of(rig)
     impacts = impacts_from_release(rig, 40)
@@ -42,8 +43,8 @@ def sequence(system: CamFollower) -> ChatterSequence:
 
 
 def hops(found: ChatterSequence, start: int, count: int) -> np.ndarray:
-    """Return the times, from release, of the impacts that follow one of the sequence
-    according to the lambda-map.
+    """Return the times, measured from release, of impact `start` of the sequence and of
+    the next `count` impacts according to the lambda-map.
     """
     r, tau = float(found.frame.restitution), float(found.tau[start])
     lam = jnp.asarray(found.speed[start] / (found.frame.jerk * tau * tau))

@@ -1,8 +1,8 @@
 """Table 6.4: closing the loop at the interruption.
 
-The compensation 1/K_beta is compared with tau*^2, the factor missing from thesis, eq.
-(6.104); D* is the impact with the best agreement. The printed matrix A starts at D* one
-turn earlier; here it starts at the end of the period, in flight.
+The compensation 1/K_beta is compared with tau*^2, the factor missing in eq. (6.104) of
+the thesis; D* is the impact with the best agreement. The printed matrix A starts at D*
+one turn earlier; here it starts at the end of the period, in flight.
 """
 
 import numpy as np
