@@ -246,7 +246,7 @@ def test_from_recordings_to_a_fitted_system(rig):
     )
     assert "The optimum was reached." in said
     # laws from the impacts on either stop
-    assert "Gap 1: ConstantRestitution" in said and "Gap 2:" in said
+    assert "constraint 0: ConstantRestitution" in said and "constraint 1:" in said
     assert (rig / "fit" / "residuals_time.png").exists()
     # there is no drive to draw them by
     assert not (rig / "fit" / "residuals_phase.png").exists()

@@ -131,6 +131,11 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "SHARED",
         "STARTS",
         "DIRECT",
+        # how sums of forms are refined in the likelihood of a curve
+        "MOST_PARTS",
+        "_REFINED",
+        "_EVALUATIONS",
+        "_MORE",
         # points of a table of a hidden element
         "_DECADE",
         "_STEPS",

@@ -39,6 +39,7 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
     import matplotlib.pyplot as plt
 
     maps = _MAPS.format(Along(found.unseen[0]).word)
+    shapes = _SHAPES if found.left_after else _SHAPES_BEFORE
     with style():
         missing = folder / "missing.png"
         nameless = []
@@ -48,7 +49,7 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
             *nameless,
             (save_figure(_unseen(plt, found), folder / "unseen.png"), _UNSEEN),
             (save_figure(_maps(plt, found), folder / "maps.png"), maps),
-            (save_figure(_shapes(plt, found), folder / "shapes.png"), _SHAPES),
+            (save_figure(_shapes(plt, found), folder / "shapes.png"), shapes),
             (save_figure(_ranking(plt, found), folder / "ranking.png"), _RANKING),
         ]
 
@@ -75,6 +76,11 @@ _SHAPES = (
     "missing effects (colour), as free functions with bands of twice the standard "
     "error. A correction whose band contains zero is not needed."
 )
+_SHAPES_BEFORE = (
+    "Corrections of the textbook model, each estimated alone as a free function, with "
+    "bands of twice the standard error. One missing effect shows in several of them; "
+    "the verdict contains what explains the data best."
+)
 _RANKING = "BIC of other explanations minus that of the verdict (logarithmic scale)."
 
 
@@ -88,7 +94,7 @@ def _unseen(plt, found: Diagnosis):
     for axis, part, label in zip(
         axes, both, ("textbook model, refitted", "with the missing effects")
     ):
-        for resting in _sides(before):
+        for resting in _sides(both):
             keep = part.resting == resting
             axis.plot(
                 part.time[keep],
@@ -133,7 +139,13 @@ def _maps(plt, found: Diagnosis):
     image = None
     for column, parts, which in zip(axes.T, found.unseen, ("before", "after")):
         for axis, resting in zip(column, sides):
-            rows = [_binned(part, resting, along) for part in parts]
+            names = list(dict.fromkeys(title_of(part, every) for part in parts))
+            rows = [
+                _binned(
+                    [p for p in parts if title_of(p, every) == name], resting, along
+                )
+                for name in names
+            ]
             image = axis.imshow(
                 np.array(rows),
                 aspect="auto",
@@ -143,7 +155,7 @@ def _maps(plt, found: Diagnosis):
                 cmap="RdBu_r",
                 interpolation="nearest",
             )
-            axis.set_yticks(range(len(rows)), [title_of(p, every) for p in parts])
+            axis.set_yticks(range(len(rows)), names)
             axis.set_title(f"{'contact' if resting else 'flight'}, {which}")
             axis.grid(False)
     for axis in axes[-1]:
@@ -159,12 +171,18 @@ def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
     return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
-def _binned(part: Residuals, resting: bool, along: Along):
-    keep = part.resting == resting
-    place = (along.place(part)[keep] - along.start) / (along.end - along.start)
-    where = np.minimum((place * _BINS).astype(int), _BINS - 1)
-    count = np.bincount(where, minlength=_BINS)
-    total = np.bincount(where, part.value[keep] / part.noise, minlength=_BINS)
+def _binned(parts: Sequence[Residuals], resting: bool, along: Along):
+    """Return the mean residual of a recording in each bin, in standard errors.
+
+    **Arguments:** the parts of the recording, each held out once.
+    """
+    count, total = np.zeros(_BINS), np.zeros(_BINS)
+    for part in parts:
+        keep = part.resting == resting
+        place = (along.place(part)[keep] - along.start) / (along.end - along.start)
+        where = np.minimum((place * _BINS).astype(int), _BINS - 1)
+        count += np.bincount(where, minlength=_BINS)
+        total += np.bincount(where, part.value[keep] / part.noise, minlength=_BINS)
     return np.where(count > 0, total / np.sqrt(np.maximum(count, 1)), np.nan)
 
 
@@ -220,7 +238,6 @@ def _shapes(plt, found: Diagnosis):
             _band(axis, after[name], IMPACT, "with the missing effects")
         axis.axhline(0.0, color="k", lw=0.6)
         one = before[name]
-        axis.set_title(spelled(name), fontsize=11)
         axis.set_xlabel(labelled(one.variable, unit_along(one.variable, found.unit)))
         axis.set_ylabel(labelled(one.quantity, one.unit.replace("^2", "²")))
         axis.xaxis.label.set_size(10)

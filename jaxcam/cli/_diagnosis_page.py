@@ -54,7 +54,10 @@ def _title(found: Diagnosis) -> str:
     if found.verdict == Verdict.NONE:
         return "no missing physics detected"
     named = [effect.name for effect in found.effects if effect.term]
-    return listed([*named, "unknown physics"])
+    unnamed = [
+        f"unnamed {one.kind} ({', '.join(one.arguments)})" for one in found.missing
+    ]
+    return listed([*named, *(unnamed or ["unknown physics"])])
 
 
 def _effects(found: Diagnosis) -> list[str]:
@@ -140,6 +143,9 @@ def _left_over(found: Diagnosis) -> list[str]:
         )
         for one in found.left_after
     ]
+    if not rows:
+        # not computed for a model with unnamed functions
+        return []
     headings = ("free function", "where", "gain", "threshold", "significant")
     return [
         "<h2>Remaining structure in the residuals</h2>",
@@ -171,5 +177,7 @@ def _limits(found: Diagnosis) -> list[str]:
         )
         for name, one in found.limits.items()
     ]
+    if not rows:
+        return []
     headings = ("parameter", "smallest detectable strength", "mostly absorbed by")
     return ["<h2>Detection limits</h2>", table_html(headings, rows, text=(0, 2))]

@@ -120,9 +120,11 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
         total = int(np.isfinite(made.states[..., 0]).sum())
     failed = int(np.count_nonzero(made.dataset["code"].values))
     low, high = sweep.bounds
+    count = len(made.ranges())
+    ranges = "1 range" if count == 1 else f"{count} ranges, each"
     return (
         f"{system}: {total} samples, {axis.name} from {low:g} to {high:g}; "
-        f"{len(made.ranges())} ranges, each with one type of attractor"
+        f"{ranges} with one type of attractor"
         + (f"; {failed} simulations failed or could not start." if failed else ".")
     )
 

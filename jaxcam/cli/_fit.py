@@ -23,6 +23,9 @@ def fit(
             help="Also compute standard errors from N Bayesian bootstrap replicates.",
         ),
     ] = 0,
+    iterations: Annotated[
+        int, typer.Option(metavar="N", help="Maximum number of iterations.")
+    ] = 60,
     json_file: Annotated[
         Path | None,
         typer.Option(
@@ -53,6 +56,8 @@ def fit(
       jaxcam fit impacts.csv
     """
     files.check()
+    if iterations < 1:
+        raise ValueError(f"--iterations is {iterations}; give a positive number.")
     if bootstrap < 0 or bootstrap == 1:
         raise ValueError(f"--bootstrap is {bootstrap}; give 0, or at least 2.")
 
@@ -79,7 +84,7 @@ def fit(
     runs, nominal = read(case, rig, files, system)
     output = Output(json_file, out)
     with progress("finding impacts and contacts") as report:
-        found = fitted(runs, nominal, bootstrap, report)
+        found = fitted(runs, nominal, bootstrap, iterations, report)
         figures = []
         if out is not None:
             report("drawing", None)

@@ -7,6 +7,7 @@ from typing import Any
 import equinox as eqx
 
 from .. import fitting
+from ..discrepancy import Policy
 from ..recordings import Recording, Rig, segment_case, Segments
 from ._fit_report import correlation_table, parameter_table
 from ._impact_laws import impact_laws
@@ -47,11 +48,17 @@ class Result:
         """Describe how well the fit explains the samples."""
         quality = self.quality
         ratio = sum(q["ratio"] for q in quality) / len(quality)
-        return (
+        sentence = (
             f"The rms residual of {self.problem.samples} samples of "
             f"{len(self.problem.records)} recordings is {ratio:.3f} times the sensor "
             "noise."
         )
+        if ratio > Policy().as_noise:
+            sentence += (
+                " The model lacks something; to find out what, run `jaxcam diagnose` "
+                "with the same files."
+            )
+        return sentence
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fitted system with its errors, for use with `--system` in other
@@ -85,11 +92,16 @@ class Result:
 
 
 def fitted(
-    runs: Iterable[Recording], nominal: Rig | fitting.Setup, bootstrap: int, report
+    runs: Iterable[Recording],
+    nominal: Rig | fitting.Setup,
+    bootstrap: int,
+    iterations: int,
+    report,
 ) -> Result:
     """Segment the recordings and fit the parameters of the rig.
 
     **Arguments:** `bootstrap`: number of Bayesian bootstrap replicates; 0 omits them.
+    `iterations`: maximum number of iterations of the fit.
 
     Raises:
         ValueError: No parameter of the rig has a tolerance.
@@ -116,10 +128,12 @@ def fitted(
     before = fitting.fit(problem, free=())
     seen = fitting.identify(problem, at=before)
     after = fitting.fit(
-        problem, progress=lambda k, cost: report(f"fitting, step {k}", None)
+        problem,
+        iterations=iterations,
+        progress=lambda k, cost: report(f"fitting, step {k}", None),
     )
     if isinstance(nominal, fitting.Setup):
-        laws = impact_laws(segments)
+        laws = impact_laws(segments, model.system)
     else:
         laws = fitting.restitution_laws(segments)
     again = None
@@ -143,5 +157,5 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
     for name, law in found.laws.items():
         where = name.rpartition(", ")[0]
         sentence = law.sentence()
-        output.print(f"{where.capitalize()}: {sentence}" if where else sentence)
+        output.print(f"{where}: {sentence}" if where else sentence)
     output.print(found.sentence if found.after.converged else found.remainder)

@@ -6,22 +6,25 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..fitting import restitution_laws, RestitutionFit
+from ..hybrid import HybridSystem
 from ..recordings import RecordingError, Segments
 from ..recordings.cut import Impacts
 
 
-def impact_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
+def impact_laws(
+    segments: Sequence[Segments], system: HybridSystem
+) -> dict[str, RestitutionFit]:
     """Fit restitution laws for each gap that has enough impacts.
 
     Returns:
         The laws from `restitution_laws`; if there are several gaps, the names begin
-            with the number of the gap.
+            with the name of the constraint.
     """
     sides = np.unique(np.concatenate([part.impacts.side for part in segments]))
     found = {}
     for side in sides:
         there = [_on(part, int(side)) for part in segments]
-        before = f"gap {side + 1}, " if len(sides) > 1 else ""
+        before = f"{system.constraint_name(int(side))}, " if len(sides) > 1 else ""
         try:
             laws = restitution_laws(there)
         except RecordingError:

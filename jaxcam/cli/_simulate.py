@@ -43,7 +43,14 @@ def simulate(
     from ._output import Output
     from ._parameters import make_model
     from ._progress import COMPILING, progress
-    from ._trajectory import about, contact_table, draw, impact_table, summary
+    from ._trajectory import (
+        about,
+        contact_table,
+        draw,
+        impact_table,
+        span_of_history,
+        summary,
+    )
 
     keep_compiled_programs()
     start = run.start(system)
@@ -71,6 +78,8 @@ def simulate(
             output.print(table)
     output.print(sentence)
     output.print_figures(figures)
+    if figures and (span := span_of_history(trajectory)):
+        output.print(span)
     found: dict[str, Any] = {"command": "simulate", "system": system}
     found |= about(trajectory) | {"solver": run.solver, "engine": run.chosen_engine}
     output.write_json(found | {"sentence": sentence, "figures": figures})

@@ -156,6 +156,15 @@ def last(trajectory: Trajectory, periods: float) -> tuple[float, float] | None:
     return None if stop - start <= 1.5 * length else (stop - length, stop)
 
 
+def span_of_history(trajectory: Trajectory) -> str:
+    """Return a sentence on the part of the motion that the time history shows, empty if
+    it shows all of it.
+    """
+    if last(trajectory, _HISTORY) is None:
+        return ""
+    return f"The time history shows the last {_HISTORY:g} forcing periods."
+
+
 def _shown(number: int) -> list[int | None]:
     if number <= 2 * _ENDS + 1:
         return list(range(number))

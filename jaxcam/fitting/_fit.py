@@ -242,8 +242,8 @@ def _descend(
             break
     else:
         message = (
-            f"The optimum was not reached in {iterations} iterations; allow more, or "
-            f"start closer to it."
+            f"The optimum was not reached in {iterations} iterations; allow more "
+            "iterations, or start closer to it."
         )
     return _Descent(point, blocks, costs, cost, optimal, count, message)
 

@@ -1,5 +1,7 @@
 """Provide axes to draw on, given or new, and common elements of axes."""
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
@@ -53,7 +55,18 @@ def legend_above(ax: Axes) -> None:
         ax.legend(
             unique.values(),
             unique.keys(),
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
+            **clear_corner(ax),
             ncols=-(-len(unique) // rows),
         )
+
+
+def clear_corner(ax: Axes) -> dict[str, Any]:
+    """Return the place of a legend above the axes: on the right if a power of ten is
+    written on the left.
+    """
+    axis = ax.yaxis
+    formatter = axis.get_major_formatter()
+    formatter.set_locs(axis.get_majorticklocs())  # pyright: ignore
+    if formatter.get_offset():
+        return {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+    return {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ._axes import figure_of, one_axes
+from ._axes import clear_corner, figure_of, one_axes
 from ._style import FLIGHT, IMPACT, SECTION, styled
 from .labels import labelled
 
@@ -212,9 +212,4 @@ def sweep_chart(
 
 
 def _above(ax: Axes, handles) -> None:
-    ax.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=min(len(handles), 5),
-    )
+    ax.legend(handles=handles, **clear_corner(ax), ncols=min(len(handles), 5))

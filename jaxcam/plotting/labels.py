@@ -25,7 +25,7 @@ def state_label(system: HybridSystem, component: int) -> str:
     """Return the label of one component of the state."""
     names, units = system.state_names, system.state_units
     name = names[component] if component < len(names) else f"$x_{{{component + 1}}}$"
-    unit = units[component] if component < len(units) else ""
+    unit = units[component] if component < len(units) else "-"
     return labelled(name, unit)
 
 

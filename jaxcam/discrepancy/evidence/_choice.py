@@ -1,6 +1,7 @@
 """Choose the terms to be named from the result of a search."""
 
 import dataclasses
+import math
 from typing import NamedTuple
 
 from ...fitting import Fit
@@ -55,6 +56,8 @@ class Choice:
         fitted in their place.
     - `differing`: a parameter whose separate values in the recordings explain most of
         the residual of the chosen fit.
+    - `tied`: a parameter whose separate values explain the data as well as the
+        functions do.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -74,6 +77,7 @@ class Choice:
     needs: Needs | None = None
     rivals: tuple[Rival, ...] = ()
     differing: Differing | None = None
+    tied: Differing | None = None
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -122,18 +126,14 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         missing, needed_parts, others = _without_a_name(
             question, trials, best, left, seed
         )
-    options = [one for one in (different, without) if one is not None]
-    separate = [one for one in options if _explains(one, best.bic)]
-    fewest = min(separate, key=lambda one: one.bic, default=None)
-    if fewest is not None and without is not None and _explains(without, best.bic):
-        # terms that hardly improve a fit with separate values only imitate these
-        tied = without.bic < fewest.bic + trials.policy.tie
-        fewest = without if tied else fewest
-    if fewest is not None and left:
-        if missing is None or fewest.bic < missing.score:
-            # no function common to the recordings explains as much
-            missing, needed_parts, others = None, None, ()
-            settled = True
+    fewest = _fewest(different, without, best.bic, trials.policy) if left else None
+    likely = math.inf if missing is None else missing.score
+    if fewest is not None and fewest.bic < likely - trials.policy.tie:
+        # no function common to the recordings explains as much
+        missing, needed_parts, others = None, None, ()
+        settled = True
+    elif fewest is not None and fewest.bic > likely + trials.policy.tie:
+        fewest = None
     if settled:
         doubtful = []
         if fewest is not None and fewest is without:
@@ -169,7 +169,26 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
         needed_parts,
         others,
         different,
+        None if missing is None else fewest,
     )
+
+
+def _fewest(
+    different: Differing | None, without: Differing | None, bic: float, policy: Policy
+) -> Differing | None:
+    """Return the separate values that explain the data with the smallest BIC, if it is
+    smaller than that of the named terms.
+
+    **Arguments:** separate values in addition to the named terms, and without them; the
+    BIC of the terms.
+    """
+    options = [one for one in (different, without) if one is not None]
+    separate = [one for one in options if _explains(one, bic)]
+    fewest = min(separate, key=lambda one: one.bic, default=None)
+    if fewest is None or without is None or not _explains(without, bic):
+        return fewest
+    # terms that hardly improve a fit with separate values only imitate these
+    return without if without.bic < fewest.bic + policy.tie else fewest
 
 
 def _settled(

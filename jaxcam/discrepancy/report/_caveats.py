@@ -84,21 +84,36 @@ def caveats_of(
 
 def differs(found: Differing, policy: Policy) -> Caveat:
     """Return the caveat that a parameter differs from recording to recording."""
-    values, unit = found.values, found.unit
-    if len(values) <= policy.several:
-        said = ", ".join(
-            f"{name} {number(value, stderr, unit)}"
-            for name, value, stderr in zip(found.records, values, found.stderr)
-        )
-    else:
-        said = f"from {min(values):.4g} to {quantity(f'{max(values):.4g}', unit)}"
     return Caveat(
         Reason.DIFFERING,
         f"The recordings differ: a separate {spelled(found.name)} for each of them "
-        f"({said}) explains {percent(found.share)} of the squared residual above the "
-        f"noise and leaves {ratio(found.left)} times the noise. The quantity that this "
-        "parameter represents has changed between the recordings.",
-        (found.name,),
+        f"({_values_of(found, policy)}) explains {percent(found.share)} of the squared "
+        f"residual above the noise and leaves {ratio(found.left)} times the noise. The "
+        "quantity that this parameter represents has changed between the recordings.",
+    )
+
+
+def may_differ(found: Differing, policy: Policy) -> Caveat:
+    """Return the caveat that separate values explain the data as well as a function
+    does.
+    """
+    return Caveat(
+        Reason.TIE,
+        f"A separate {spelled(found.name)} for each recording "
+        f"({_values_of(found, policy)}) would explain the data as well as the function "
+        "does. Make a recording in which the motion varies over the ranges of several "
+        "of these recordings: only the function predicts it.",
+    )
+
+
+def _values_of(found: Differing, policy: Policy) -> str:
+    """Return the separate values of a parameter, or their range, in words."""
+    values, unit = found.values, found.unit
+    if len(values) > policy.several:
+        return f"from {min(values):.4g} to {quantity(f'{max(values):.4g}', unit)}"
+    return ", ".join(
+        f"{name} {number(value, stderr, unit)}"
+        for name, value, stderr in zip(found.records, values, found.stderr)
     )
 
 

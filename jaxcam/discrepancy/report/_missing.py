@@ -158,12 +158,14 @@ def _one(
     rows = [labels.index(name) for name in one.coefficients]
     numbers = np.array([found.estimates[row].value for row in rows])
     covariance = found.covariance[np.ix_(rows, rows)]
+    arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
+    # a table of two arguments has half as many points along each of them
+    points = points // 2 if len(arguments) > 1 else points
     along = np.linspace(family.low, family.high, points)
     if one.primitive is not None:
         along = _graded(along, lambda x: _curve(one, x, numbers)[0])
     value, basis = _curve(one, along, numbers)
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
-    arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
     words, formula = _words(family, kind, along, value, error), None
     if one.primitive is not None:
         formula, words = formula_of(family, one.primitive, numbers, kind)

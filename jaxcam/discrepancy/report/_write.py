@@ -31,6 +31,7 @@ from ._caveats import (
     differs,
     functions_fall_short,
     functions_tie,
+    may_differ,
     noisier_than_stated,
     small_remainder,
 )
@@ -196,6 +197,8 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
         yield decoy_explains(share)
     if choice.differing is not None:
         yield differs(choice.differing, policy)
+    if choice.tied is not None:
+        yield may_differ(choice.tied, policy)
     if left > policy.as_noise:
         yield functions_fall_short(left)
     elif held.after > policy.as_noise:
