@@ -1,12 +1,16 @@
 """A parameter that differs from recording to recording; truth from closed forms."""
 
+import types
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.evidence._choice import _fewest
 from jaxcam.discrepancy.evidence._differing import differing
+from jaxcam.discrepancy.report._caveats import may_differ, Reason
 from jaxcam.discrepancy.search._roughness import Roughness
 from jaxcam.discrepancy.search._slots import filled, Free, roomy
 from jaxcam.discrepancy.terms import Family, Variable, Where, WithTerms
@@ -106,3 +110,35 @@ def test_a_form_that_jumps_has_more_substeps():
         one = Free(family, Roughness(), "force_a", form)
         made = np.asarray(filled(room, [one]).pieces.substeps)
         np.testing.assert_array_equal(made, np.maximum(before, least))
+
+
+def _separate(bic, complete=True):
+    """Separate values of which only the evidence matters."""
+    return types.SimpleNamespace(bic=bic, complete=complete)
+
+
+def test_terms_that_hardly_improve_separate_values_are_dropped(unchecked_types):
+    """The named terms have a BIC of 1000; a difference below 10 is a tie."""
+    policy, alone = Policy(), _separate(905.0)
+    assert _fewest(_separate(900.0), alone, 1000.0, policy) is alone
+    with_terms = _separate(890.0)
+    assert _fewest(with_terms, alone, 1000.0, policy) is with_terms
+
+
+def test_separate_values_must_leave_noise_and_beat_the_terms(unchecked_types):
+    policy = Policy()
+    assert _fewest(_separate(900.0, False), None, 1000.0, policy) is None
+    assert _fewest(_separate(1001.0), None, 1000.0, policy) is None
+    assert _fewest(None, None, 1000.0, policy) is None
+    only = _separate(950.0)
+    assert _fewest(_separate(1001.0), only, 1000.0, policy) is only
+
+
+def test_values_that_tie_with_a_function_are_stated_with_the_next_recording():
+    found = _fitted([_free(0.3, 0.25), _free(0.2, 0.35)])
+    one = differing(found, Policy())
+    assert one is not None and one.name == "damping"
+    caveat = may_differ(one, Policy())
+    assert caveat.reason is Reason.TIE
+    assert "run0 0.25" in caveat.sentence and "run1 0.35" in caveat.sentence
+    assert "Make a recording" in caveat.sentence
