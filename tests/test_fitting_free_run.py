@@ -16,6 +16,7 @@ from jaxcam.fitting import (
     Sensor,
     Turning,
 )
+from jaxcam.hybrid import SwitchedSystem
 from jaxcam.recordings import Recording, RecordingError
 
 
@@ -196,3 +197,44 @@ def test_bounds_hold():
     bounded = [PARAMETERS[0], dataclasses.replace(PARAMETERS[1], lower=0.7)]
     found = fit_free_run(model(viscous=0.9), [run], bounded)
     assert found.values["viscous"] == pytest.approx(0.7, abs=1e-3)
+
+
+class Rattle(SwitchedSystem):
+    """An oscillator of 20 rad/s whose spring is a little stiffer on one side."""
+
+    state_names = ("position", "velocity")
+
+    def switching(self, t, state):
+        return state[0]
+
+    def branch(self, t, state, sides):
+        stiffness = jnp.where(sides[0] > 0, 420.0, 400.0)
+        return jnp.stack([state[1], -stiffness * state[0]])
+
+
+def _rattling(interval: float):
+    """A free run of the motion from rest at 0.1, and the exact solution."""
+    time = interval * np.arange(40)
+    fast, slow = np.sqrt(420.0), 20.0
+    half, other = np.pi / fast, np.pi / slow
+    since = (time + half / 2) % (half + other)
+    speed = 0.1 * fast
+    position = np.where(
+        since < half,
+        speed / fast * np.sin(fast * since),
+        -speed / slow * np.sin(slow * (since - half)),
+    )
+    run = Recording("rattle", time, {"position_m": position})
+    model = Model(Rattle(), {"position_m": Sensor(0, noise=1e-5)})
+    return free_run(model, run, samples=10).residual("position_m")
+
+
+def test_switching_events_between_two_samples_are_located():
+    """To 1e-4 of the amplitude in 40 samples."""
+    assert np.max(np.abs(_rattling(0.02))) < 1e-5
+    assert np.max(np.abs(_rattling(0.1))) < 1e-5
+
+
+def test_a_free_run_that_switches_too_often_says_so():
+    with pytest.raises(ValueError, match="at least 4 switching events between"):
+        _rattling(0.9)

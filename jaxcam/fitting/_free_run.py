@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..hybrid import SwitchedSystem
 from ..hybrid.programs import program
@@ -40,8 +40,9 @@ _FIRST_STEPS, _MOST_STEPS = 2, 64
 # Allowed change of the simulated motion when the steps are halved, in standard
 # deviations of the noise or relative to the motion
 _OF_NOISE, _OF_MOTION = 0.1, 1e-6
-# Switching events that are located between two samples
-_EVENTS = 3
+# Switching events that are located between two samples; if there are as many, there may
+# be more
+_EVENTS = 4
 # Relative difference allowed between sampling intervals
 _UNEVEN = 0.01
 
@@ -100,8 +101,8 @@ def free_run(
 
     Raises:
         RecordingError: The recording is too short, unevenly sampled or lacks a channel.
-        ValueError: The model has a rotating drive, or the motion meets a constraint or
-            does not stay finite.
+        ValueError: The model has a rotating drive, or the motion meets a constraint,
+            does not stay finite, or has too many switching events between two samples.
 
     Examples:
         >>> from jaxcam.fitting import free_run, Model, Sensor
@@ -128,6 +129,13 @@ def free_run(
             f"{run.name}: the free run meets a constraint at "
             f"{run.time[below[0]]:.4g} s; a free run is for motions without impacts, "
             f"use `jaxcam.simulate` for others."
+        )
+    crowded = np.flatnonzero(np.asarray(found.events) >= _EVENTS)
+    if len(crowded):
+        raise ValueError(
+            f"{run.name}: the free run has at least {_EVENTS} switching events between "
+            f"the samples at {run.time[crowded[0]]:.4g} s, and no more are located; "
+            f"give a recording with shorter sampling intervals."
         )
     data = np.asarray(one.data)
     return FreeRun(
@@ -159,10 +167,13 @@ class Prepared(eqx.Module):
 
 
 class Simulated(NamedTuple):
-    """Channels `(k, c)` and the smallest gap `(k,)` at each sample."""
+    """Channels `(k, c)` and the smallest gap `(k,)` at each sample, and the number of
+    events `(k,)` up to the next sample.
+    """
 
     channels: Float[Array, "k c"]
     gap: Float[Array, " k"]
+    events: Int[Array, " k"]
 
 
 def prepared(model: Model, recording: Recording | Segments, samples: int) -> Prepared:
@@ -214,7 +225,7 @@ def simulated(model: Model, one: Prepared) -> Simulated:
     step = one.interval / one.steps
     size = one.state.shape[0] - len(filtered_channels(model))
 
-    def seen(t, system, x, field):
+    def seen(t, system, x, field, events=0):
         values = []
         for name, sensor in model.sensors.items():
             if sensor.filtered:
@@ -224,7 +235,7 @@ def simulated(model: Model, one: Prepared) -> Simulated:
                 value, slope = jax.jvp(sensor.seen, (x[:size],), (field[:size],))
             values.append(sensor.offset + sensor.gain * (value - sensor.lag * slope))
         gap = jnp.min(gaps(system, t, x[:size]), initial=jnp.inf)
-        return Simulated(jnp.stack(values), gap)
+        return Simulated(jnp.stack(values), gap, jnp.asarray(events, dtype=int))
 
     def sample(carried, inputs):
         x, mode = carried
@@ -236,7 +247,8 @@ def simulated(model: Model, one: Prepared) -> Simulated:
             still = jnp.zeros(one.steps)
             drive = DriveState(jnp.full(one.steps, level), still, still)
             found = switched_nodes(model, x, t, step, drive, 1, mode, _EVENTS)
-            return (found[0][-1], found[2]), seen(t, system, x, found[1][0])
+            states, rates, mode, events = found
+            return (states[-1], mode), seen(t, system, x, rates[0], events)
 
         def advance(x, k):
             at = t + k * step

@@ -40,7 +40,7 @@ def fly(model: Model, state, start, step, drive: DriveState, substeps: Any = 1):
     **Returns:** the state at its end `(n,)`, and its `Nodes`.
     """
     if isinstance(model.system, SwitchedSystem):
-        states, fields, _ = switched_nodes(model, state, start, step, drive, substeps)
+        states, fields, *_ = switched_nodes(model, state, start, step, drive, substeps)
     else:
         states, fields = _nodes(model, state, start, step, drive, 1)
         if not _is_one(substeps):

@@ -108,8 +108,8 @@ def switched_nodes(
     mode: Mode | None = None,
     events: int = EVENTS,
 ):
-    """Return the states at the ends of all steps `(n + 1, s)`, their rates, and the
-    mode at the end.
+    """Return the states at the ends of all steps `(n + 1, s)`, their rates, the mode at
+    the end, and the number of events.
 
     **Arguments:** as for `fly`, the `mode` at the start (default: that of a motion that
     starts there), and the maximum number of events.
@@ -123,7 +123,8 @@ def switched_nodes(
     states = states + jax.lax.stop_gradient(fine - states)
     last = steps.field(steps.count - 1, found.mode)
     final = last(start + steps.count * step, states[-1])
-    return states, jnp.concatenate([rates, final[None]]), found.mode
+    events = jnp.sum(jnp.any(found.parts.ends, axis=-1))
+    return states, jnp.concatenate([rates, final[None]]), found.mode, events
 
 
 def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
