@@ -230,9 +230,9 @@ def _rattling(interval: float):
 
 
 def test_switching_events_between_two_samples_are_located():
-    """To 1e-4 of the amplitude in 40 samples."""
-    assert np.max(np.abs(_rattling(0.02))) < 1e-5
-    assert np.max(np.abs(_rattling(0.1))) < 1e-5
+    """To 1e-5 of the amplitude in 40 samples."""
+    assert np.max(np.abs(_rattling(0.02))) < 1e-6
+    assert np.max(np.abs(_rattling(0.1))) < 1e-6
 
 
 def test_a_free_run_that_switches_too_often_says_so():

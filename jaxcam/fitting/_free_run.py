@@ -216,7 +216,8 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
         if bool(jnp.all(off <= jnp.maximum(_OF_NOISE * one.noise, _OF_MOTION * size))):
             break
         one, found = finer, again
-    return one
+    # the first estimate of the state is only as accurate as the first steps
+    return one if one.steps == _FIRST_STEPS else _started(model, one)
 
 
 @program
