@@ -27,6 +27,12 @@ def diagnose(
     propose: Annotated[
         bool, typer.Option("--next", help="Recommend the next test speed.")
     ] = False,
+    extended: Annotated[
+        bool,
+        typer.Option(
+            "--extended", help="Also try the terms of the extended library (slower)."
+        ),
+    ] = False,
     resume: Resume = False,
     json_file: Annotated[
         Path | None,
@@ -81,7 +87,13 @@ def diagnose(
     notes = notes_of(runs)
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
-            nominal, tuple(runs), case=runs.name, seed=seed, progress=report, keep=keep
+            nominal,
+            tuple(runs),
+            "extended" if extended else None,
+            case=runs.name,
+            seed=seed,
+            progress=report,
+            keep=keep,
         )
         figures = []
         if out is not None:

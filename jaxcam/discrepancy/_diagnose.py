@@ -14,6 +14,7 @@ from .evidence import choose, ripple_of
 from .policy import Policy
 from .report import Diagnosis, diagnosis_of
 from .search import (
+    Candidates,
     KeptTrials,
     Question,
     Report,
@@ -22,13 +23,13 @@ from .search import (
     system_question,
     Trials,
 )
-from .terms import Location, Term
+from .terms import Location
 
 
 def diagnose(
     system: HybridSystem | Rig | Setup,
     recordings: Sequence[Recording | Segments],
-    candidates: Sequence[Term] | None = None,
+    candidates: Candidates = None,
     *,
     sensors: Mapping[str, Sensor] | None = None,
     parameters: Sequence[Parameter] = (),
@@ -55,7 +56,8 @@ def diagnose(
         recordings: At least two recordings of a rig; for a bare system, segments from
             `jaxcam.recordings.segment`.
         candidates: Terms that may be named; default: `library()`, with the constants of
-            the rig. Terms with `listed=False` only help to describe an unknown effect.
+            the rig; `"extended"`: the same with `library(extended=True)`. Terms with
+            `listed=False` only help to describe an unknown effect.
         sensors: For a bare system, as for `jaxcam.fitting.Model`.
         parameters: For a bare system, as for `jaxcam.fitting.Problem`.
         drive: For a bare system, its measured drive or input.
@@ -71,8 +73,11 @@ def diagnose(
 
     Raises:
         RecordingError: The recordings are insufficient; the message gives the reason.
-        ValueError: A term overrides none of the methods through which it can act.
+        ValueError: A term overrides none of the methods through which it can act; or
+            `candidates` is an unknown word.
     """
+    if isinstance(candidates, str) and candidates != "extended":
+        raise ValueError(f'`candidates` is "{candidates}"; give terms, or "extended".')
     report = progress or (lambda sentence, fraction: None)
     make_room()
 
@@ -108,7 +113,7 @@ def diagnose(
         folder = None if keep is None else keep / "without_one"
         found = set_aside(found, asked(others, folder), odd)
     elif falls_short(found):
-        found = sought_elsewhere(found, asked_at, candidates is None)
+        found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
     if keep is not None:
         shutil.rmtree(keep, ignore_errors=True)
     return found

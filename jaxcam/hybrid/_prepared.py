@@ -1,14 +1,31 @@
 """Prepare a system before a run that is not traced."""
 
+from ._identity import digest_of, structure_of
 from ._system import HybridSystem
-from .programs import program
+from .caches import Cache, Latest
+from .programs import is_traced, program
+
+
+# Preparing a system may take as long as a short run; a run prepares it several times
+_LATEST, _READY = Latest(), Cache(64)
 
 
 def prepared(system: HybridSystem) -> HybridSystem:
     """Return the prepared system."""
     if type(system).prepared is HybridSystem.prepared:
         return system
-    return _by_xla(system)
+    latest = _LATEST.get(system)
+    if latest is not None:
+        return latest
+    if is_traced(system):
+        return _by_xla(system)
+    key = structure_of(system), digest_of(system)
+    if key[0] is None:
+        ready = _by_xla(system)
+    else:
+        ready = _READY.get(key, lambda: _by_xla(system))
+    _LATEST.keep(system, ready)
+    return ready
 
 
 @program

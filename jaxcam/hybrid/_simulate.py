@@ -16,8 +16,8 @@ from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from ._types import RealScalar
 from ._untraced import prepare, run_untraced
-from .checks import check_start
-from .codes import PAINLEVE, RUNNING
+from .checks import check_arguments, check_gaps
+from .codes import BEHIND, NOT_FINITE, PAINLEVE, RUNNING
 from .loop import Log, LoopState, run, run_reversible
 from .lowering import whole
 from .programs import is_traced, program
@@ -108,7 +108,7 @@ def simulate(
     else:
         state, t_start = real_array(state), t0
     if not traced:
-        check_start(system, settings, t_start, state, t1)
+        check_arguments(system, settings, t_start, state, t1)
     if engine == "diffeqsolve":
         if isinstance(system, SwitchedSystem):
             raise ValueError(
@@ -120,6 +120,7 @@ def simulate(
                 'engine="diffeqsolve" is driven from Python and cannot be traced by '
                 'jit, vmap or grad; use engine="loop" there'
             )
+        check_gaps(system, settings, t_start, state)
         budget = 1_000_000 if max_steps is None else max_steps
         log, contact, code = simulate_segments(
             system, settings, t_start, state, t1, budget, progress
@@ -143,6 +144,9 @@ def simulate(
             system, settings, t_start, state, t1, budget, progress
         )
         parts = _assemble(system, t_start, state, mode, log, settings.compiles)
+    if int(code) in (BEHIND, NOT_FINITE):
+        # the loop has found out, but does not say by how much
+        check_gaps(system, settings, t_start, state)
     return _trajectory(system, settings, t0, t1, _trim(parts), code)
 
 

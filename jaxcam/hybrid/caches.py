@@ -8,7 +8,7 @@ from typing import Any
 import jax
 
 
-_ALL: "weakref.WeakSet[Cache]" = weakref.WeakSet()
+_ALL: "weakref.WeakSet[Cache | Latest]" = weakref.WeakSet()
 
 
 class Cache:
@@ -44,6 +44,27 @@ class Cache:
         """Discard all results."""
         with self._lock:
             self._results.clear()
+
+
+class Latest:
+    """The latest result, for an object that is passed again."""
+
+    def __init__(self):
+        self._latest: tuple[Any, Any] = (None, None)
+        _ALL.add(self)
+
+    def get(self, one: object) -> Any:
+        """Return the result for an object, or `None` if it is not the latest one."""
+        latest, result = self._latest
+        return result if latest is one else None
+
+    def keep(self, one: object, result: Any) -> None:
+        """Keep the result for an object in place of the one before."""
+        self._latest = (one, result)
+
+    def clear(self) -> None:
+        """Discard the result."""
+        self._latest = (None, None)
 
 
 def clear_caches() -> None:

@@ -1,13 +1,12 @@
 """Detect invalid input before anything is compiled; each message states the remedy."""
 
-import hashlib
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.errors import ConcretizationTypeError, TracerArrayConversionError
 
+from ._identity import digest_of, structure_of
 from ._prepared import prepared
 from ._settings import Settings
 from ._switched import SwitchedSystem
@@ -35,6 +34,12 @@ def refuse_tracers(name: str, instead: str, *arguments) -> None:
 
 def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
     """Raise `ValueError` for a start that cannot be simulated."""
+    check_arguments(system, settings, t0, state, t1)
+    check_gaps(system, settings, t0, state)
+
+
+def check_arguments(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
+    """Raise `ValueError` for an invalid system, settings, times or state."""
     settings.check()
     if state.ndim != 1:
         raise ValueError(
@@ -58,6 +63,12 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
             "so interchange them"
         )
     check_system(system, t0, state, settings)
+
+
+def check_gaps(system: HybridSystem, settings: Settings, t0, state) -> None:
+    """Raise `ValueError` for a state that penetrates a constraint, or whose gaps are
+    not finite.
+    """
     case = prepared(system), t0, state
     behind, values = _STARTS_BEHIND.once(case, compiles=settings.compiles)
     if not np.all(np.isfinite(values)):
@@ -83,8 +94,9 @@ _MANY = 1000
 
 def check_system(system, t0, state, settings: Settings) -> None:
     """Raise `ValueError` for an invalid parameter or function of the system."""
-    signature = _signature(system, state)
-    numbers = signature, _digest(system)
+    structure = structure_of(system)
+    signature = None if structure is None else (structure, state.shape)
+    numbers = signature, digest_of(system)
     if signature is not None and numbers in _SOUND:
         return
     for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)):
@@ -112,29 +124,6 @@ def _check_switches(system: SwitchedSystem) -> None:
         raise ValueError(f"hysteresis is {system.hysteresis}; it cannot be negative")
     if not np.all(np.asarray(system.holding) >= 1):
         raise ValueError(f"holding is {system.holding}; it must be at least one")
-
-
-def _digest(system) -> bytes:
-    """Return a hash of all numbers of a system."""
-    found = hashlib.blake2b(digest_size=16)
-    for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)):
-        if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
-            leaf = jax.random.key_data(leaf)
-        found.update(np.asarray(leaf).tobytes())
-    return found.digest()
-
-
-def _signature(system, state):
-    """Return everything that determines the shapes of a system; `None` if unknown."""
-    arrays, rest = eqx.partition(system, eqx.is_array)
-    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(arrays))
-    fixed, structure = jax.tree.flatten(rest)
-    signature = structure, tuple(fixed), shapes, state.shape
-    try:
-        hash(signature)
-    except TypeError:
-        return None
-    return signature
 
 
 def _check_shapes(system, t0, state) -> None:

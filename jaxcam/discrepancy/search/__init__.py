@@ -20,7 +20,11 @@ from ._kept_trials import KeptTrials as KeptTrials
 from ._leads import decoys_of as decoys_of
 from ._local_force import force_blocks as force_blocks, Response as Response
 from ._named_terms import with_terms as with_terms
-from ._question import Question as Question, Report as Report
+from ._question import (
+    Candidates as Candidates,
+    Question as Question,
+    Report as Report,
+)
 from ._rig_question import rig_question as rig_question
 from ._roughness import occam as occam, Roughness as Roughness, roughness as roughness
 from ._search import Search as Search

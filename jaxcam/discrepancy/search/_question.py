@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +13,10 @@ from ...recordings import Recording, RecordingError, References
 from ...recordings.cut import least_noise, Segments
 from ..policy import Policy
 from ..terms import Location, SensorTerm, Term, Where
+
+
+Candidates: TypeAlias = Sequence[Term] | Literal["extended"] | None
+"""Terms that may be named: those given, the extended library, or the library."""
 
 
 Report = Callable[[str, float | None], None]

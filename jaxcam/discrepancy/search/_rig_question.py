@@ -9,10 +9,11 @@ from ...recordings import Recording, RecordingError, Rig, segment_case
 from ...recordings.cut import Segments
 from ...recordings.files import check_channels, check_drive
 from ..policy import Policy
-from ..terms import base_drive, library, Term, watched, WithTerms
+from ..terms import base_drive, library, watched, WithTerms
 from ._motion_scales import motion_scales
 from ._question import (
     by_listing,
+    Candidates,
     Question,
     refuse_one,
     Report,
@@ -30,7 +31,7 @@ _ANGLES = 64
 def rig_question(
     rig: Rig,
     recordings: Sequence[Recording | Segments],
-    candidates: Sequence[Term] | None,
+    candidates: Candidates,
     report: Report,
     policy: Policy,
 ) -> Question:
@@ -46,8 +47,9 @@ def rig_question(
     cut = [run for run in runs if isinstance(run, Segments)]
     if len(cut) < len(runs):
         cut = list(segment_case(runs, rig))  # pyright: ignore
-    if candidates is None:
-        candidates = library(references=rig.references)
+    if candidates is None or isinstance(candidates, str):
+        extended = candidates is not None
+        candidates = library(references=rig.references, extended=extended)
     base = cam_follower_model(rig)
     own = [part.recording for part in cut]
     sensors, noisier = with_seen_noise(base.sensors, own, policy)

@@ -33,6 +33,7 @@ from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
 from ._question import (
     by_listing,
+    Candidates,
     Question,
     refuse_one,
     Report,
@@ -49,7 +50,7 @@ _RESOLVED = 0.3
 def setup_question(
     setup: Setup,
     recordings: Sequence[Recording | Segments],
-    candidates: Sequence[Term] | None,
+    candidates: Candidates,
     report: Report,
     policy: Policy,
     location: Location = Location(),
@@ -83,7 +84,7 @@ def setup_question(
 def system_question(
     system: HybridSystem,
     recordings: Sequence[Segments],
-    candidates: Sequence[Term] | None,
+    candidates: Candidates,
     sensors: Mapping[str, Sensor] | None,
     parameters: Sequence[Parameter],
     drive: Turning | Input | None,
@@ -124,8 +125,9 @@ def system_question(
     clocked = turned or drive is not None
 
     def listed(references: References):
-        if candidates is None:
-            usual = library(turned, references, clocked=clocked)
+        if candidates is None or isinstance(candidates, str):
+            extended = candidates is not None
+            usual = library(turned, references, clocked, extended)
             offered = [location.of_library(term) for term in usual]
         else:
             offered = [location.reordered(term, len(pairs)) for term in candidates]

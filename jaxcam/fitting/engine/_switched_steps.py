@@ -123,8 +123,8 @@ def switched_nodes(
     states = states + jax.lax.stop_gradient(fine - states)
     last = steps.field(steps.count - 1, found.mode)
     final = last(start + steps.count * step, states[-1])
-    events = jnp.sum(jnp.any(found.parts.ends, axis=-1))
-    return states, jnp.concatenate([rates, final[None]]), found.mode, events
+    count = jnp.sum(jnp.any(found.parts.ends, axis=-1))
+    return states, jnp.concatenate([rates, final[None]]), found.mode, count
 
 
 def switched_end(model: Model, state, start, step, drive: DriveState, substeps):

@@ -1,0 +1,36 @@
+"""Keys of systems: two systems with the same key behave alike."""
+
+import hashlib
+from collections.abc import Hashable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._system import HybridSystem
+
+
+def structure_of(system: HybridSystem) -> Hashable | None:
+    """Return everything that determines the programs of a system; `None` if it is not
+    hashable.
+    """
+    arrays, rest = eqx.partition(system, eqx.is_array)
+    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(arrays))
+    fixed, structure = jax.tree.flatten(rest)
+    found = structure, tuple(fixed), shapes
+    try:
+        hash(found)
+    except TypeError:
+        return None
+    return found
+
+
+def digest_of(system: HybridSystem) -> bytes:
+    """Return a hash of all numbers of a system."""
+    found = hashlib.blake2b(digest_size=16)
+    for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)):
+        if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
+            leaf = jax.random.key_data(leaf)
+        found.update(np.asarray(leaf).tobytes())
+    return found.digest()
