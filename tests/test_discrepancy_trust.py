@@ -11,6 +11,7 @@ from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, Policy, strength, Term, Verdict
 from jaxcam.discrepancy.evidence import shares, VisitedStates
 from jaxcam.discrepancy.report import Reason
+from jaxcam.discrepancy.search import system_question
 from jaxcam.fitting import Parameter, Sensor
 from jaxcam.recordings import Recording, segment
 from jaxcam.recordings.cut import least_noise, measured_noise
@@ -205,3 +206,34 @@ def test_a_candidate_that_cannot_be_fitted_hides_no_other():
     assert alone.names == both.names == ("sail",)
     (value,) = (one.effects[0].parameters["drag"].value for one in (both,))
     assert value == pytest.approx(alone.effects[0].parameters["drag"].value, rel=1e-3)
+
+
+def test_an_unknown_word_for_the_candidates_is_refused(unchecked_types):
+    with pytest.raises(ValueError, match='is "all"; give terms, or "extended"'):
+        _diagnosed([_free(0.3, 0.1), _free(0.2, 0.1)], candidates="all")
+
+
+def test_the_extended_library_is_chosen_by_a_word():
+    """Its terms are offered in addition to those of the library."""
+    runs = [
+        Recording(f"run{k}", _TIME, {"angle_rad": _free(x0, 0.1)})
+        for k, x0 in enumerate((0.3, 0.2))
+    ]
+    parts = [segment(run, "angle_rad", noise=_NOISE) for run in runs]
+    few, many = (
+        {
+            term.name
+            for term in system_question(
+                DampedSwing(),
+                parts,
+                candidates,
+                {"angle_rad": Sensor(0, noise=_NOISE)},
+                _PARAMETERS,
+                None,
+                lambda *_: None,
+                Policy(),
+            ).terms
+        }
+        for candidates in (None, "extended")
+    )
+    assert few < many and "stop_above" in many - few
