@@ -261,3 +261,17 @@ def test_damping_in_a_zone_is_a_formula_of_two_arguments():
     text, words = formula_of(family, window, np.array([-0.3, 0.2, 0.6]), "force")
     assert text == "-0.3*(-0.1 < position)*(position < 0.5)*velocity"
     assert words.startswith("damping that acts only between position -0.1 and 0.5")
+
+
+def test_a_formula_has_no_double_signs_and_no_phase_just_below_a_turn():
+    """Amplitudes are positive, and a phase that vanishes is written as zero."""
+    family = _family(Variable.PHASE)
+    forms = {one.name: one for one in family.primitives}
+    both = sum_of([forms["harmonic 1"], forms["harmonic 3"]], [1.0, 1.0])
+    numbers = np.array([0.5, -2e-4, -0.3, 0.4])
+    text, _ = formula_of(family, both, numbers, "force")
+    assert text == "0.5*cos(phase + 0.0002) + 0.3*cos(3*phase - 3.542)"
+    family = _family(Variable.POSITION)
+    straight = next(one for one in family.primitives if one.name == "straight")
+    text, _ = formula_of(family, straight, np.array([1.5]), "force")
+    assert text == "1*(position + 0.4)"

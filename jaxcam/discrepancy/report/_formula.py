@@ -80,6 +80,8 @@ _FAULTS = {
     Variable.PHASE: "as from a disturbance synchronous with the drive",
     Variable.TIME: "as from a sensor that drifts",
 }
+# an angle just below zero is not written as one just below 2 pi
+_BELOW_ZERO = 0.05
 _FACTORS = {
     Factor.VELOCITY: ("velocity", "damping"),
     Factor.DIRECTION: ("sign(velocity)", "dry friction"),
@@ -96,6 +98,7 @@ def formula_of(
     """
     texts, sentences, mechanism = [], [], ""
     for part, own in primitive.divided(numbers):
+        own = _with_positive_size(part, own)
         values = _values(family, own)
         texts.append(_FORMULAS[part.name].format(**values))
         sentence = _WORDS[part.name].format(**values)
@@ -116,7 +119,16 @@ def formula_of(
         text = f"{text}*{factor}"
     elif kind == "restitution":
         text = f"exp({text})"
+    text = text.replace("- -", "+ ")
     return text, f"{thing} that {says}: {text}{mechanism}"
+
+
+def _with_positive_size(form: Primitive, numbers: np.ndarray) -> np.ndarray:
+    """Return the parameters of an oscillation with a positive amplitude."""
+    if form.name.split()[0] not in ("wave", "harmonic") or numbers[0] >= 0:
+        return numbers
+    size, *others, phase = numbers
+    return np.array([-size, *others, phase + math.pi])
 
 
 def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
@@ -146,13 +158,18 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
         "decay": abs(first) * width,
         "wavenumber": 2 * math.pi * first / width,
         "wavelength": width / first if first else math.inf,
-        "lead": second,
-        "turn": first % (2 * math.pi),
+        "lead": _turned(second),
+        "turn": _turned(first),
         "rim": math.cos(second),
         "half": abs(second),
     }
     words = {"x": x, "trend": "decays" if first < 0 else "grows"}
     return {name: f"{value:.4g}" for name, value in shown.items()} | words
+
+
+def _turned(angle: float) -> float:
+    """Return an angle between 0 and 2 pi, or just below zero."""
+    return (angle + _BELOW_ZERO) % (2 * math.pi) - _BELOW_ZERO
 
 
 def _mechanism(family: Family, primitive: Primitive, numbers, values) -> str:
