@@ -230,11 +230,18 @@ def _rattling(interval: float):
 
 
 def test_switching_events_between_two_samples_are_located():
-    """To 1e-5 of the amplitude in 40 samples."""
+    """To 1e-5 of the amplitude in 40 samples, in long intervals to 2e-3."""
     assert np.max(np.abs(_rattling(0.02))) < 1e-6
     assert np.max(np.abs(_rattling(0.1))) < 1e-6
+    # with two or three events between two samples, the steps are as short as possible
+    assert np.max(np.abs(_rattling(0.44))) < 2e-4
 
 
 def test_a_free_run_that_switches_too_often_says_so():
-    with pytest.raises(ValueError, match="at least 4 switching events between"):
+    with pytest.raises(ValueError, match="at least 4 switching events between the sample at"):
+        _rattling(0.48)
+
+
+def test_a_free_run_of_a_motion_far_too_fast_for_its_samples_says_so():
+    with pytest.raises(ValueError, match="64 integration steps between two samples"):
         _rattling(0.9)

@@ -40,6 +40,8 @@ _FIRST_STEPS, _MOST_STEPS = 2, 64
 # Allowed change of the simulated motion when the steps are halved, in standard
 # deviations of the noise or relative to the motion
 _OF_NOISE, _OF_MOTION = 0.1, 1e-6
+# Change, relative to the motion, above which the largest number of steps is too small
+_TOO_FAR = 1e-2
 # Switching events that are located between two samples; if there are as many, there may
 # be more
 _EVENTS = 4
@@ -102,7 +104,8 @@ def free_run(
     Raises:
         RecordingError: The recording is too short, unevenly sampled or lacks a channel.
         ValueError: The model has a rotating drive, or the motion meets a constraint,
-            does not stay finite, or has too many switching events between two samples.
+            does not stay finite, has too many switching events between two samples, or
+            is too fast for the sampling interval.
 
     Examples:
         >>> from jaxcam.fitting import free_run, Model, Sensor
@@ -130,12 +133,12 @@ def free_run(
             f"{run.time[below[0]]:.4g} s; a free run is for motions without impacts, "
             f"use `jaxcam.simulate` for others."
         )
-    crowded = np.flatnonzero(np.asarray(found.events) >= _EVENTS)
+    crowded = np.flatnonzero(np.asarray(found.events)[:-1] >= _EVENTS)
     if len(crowded):
         raise ValueError(
             f"{run.name}: the free run has at least {_EVENTS} switching events between "
-            f"the samples at {run.time[crowded[0]]:.4g} s, and no more are located; "
-            f"give a recording with shorter sampling intervals."
+            f"the sample at {run.time[crowded[0]]:.4g} s and the next, and no more are "
+            f"located; give a recording with shorter sampling intervals."
         )
     data = np.asarray(one.data)
     return FreeRun(
@@ -208,16 +211,23 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
     )
     one = _started(model, one)
     found = simulated(model, one)
-    while one.steps < _MOST_STEPS:
-        finer = dataclasses.replace(one, steps=2 * one.steps)
+    while True:
+        # with too long steps, the estimate of the state may be far off as well
+        finer = _started(model, dataclasses.replace(one, steps=2 * one.steps))
         again = simulated(model, finer)
         off = jnp.max(jnp.abs(again.channels - found.channels), axis=0)
         size = jnp.ptp(again.channels, axis=0)
         if bool(jnp.all(off <= jnp.maximum(_OF_NOISE * one.noise, _OF_MOTION * size))):
-            break
+            return one
         one, found = finer, again
-    # the first estimate of the state is only as accurate as the first steps
-    return one if one.steps == _FIRST_STEPS else _started(model, one)
+        if one.steps < _MOST_STEPS:
+            continue
+        if bool(jnp.any(off > jnp.maximum(one.noise, _TOO_FAR * size))):
+            raise ValueError(
+                f"{run.name}: {_MOST_STEPS} integration steps between two samples are "
+                f"too few; give a recording with shorter sampling intervals."
+            )
+        return one
 
 
 @program

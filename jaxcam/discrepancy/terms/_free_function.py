@@ -75,43 +75,49 @@ def _splines(numbers, forms, waves, ends, jumping, stride):
     knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
     place = Place.between(knots, low, high)
 
-    def sines():
+    def both(table, apart=None):
+        if stride is None:
+            return table, None
+        if apart is None:
+            return table, table
+        reach = jnp.minimum(stride, apart * (high - low))
+        return table, _shares(knots, reach) @ table
+
+    def nothing(own):
+        return both(jnp.zeros(_KNOTS)), jnp.zeros(())
+
+    def sines(own):
         each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(rates * spacing))
         phases = jnp.outer(knots, rates) + shifts[None]
-        return jnp.sin(phases) @ each, jnp.zeros(()), jumping * numbers[-1]
+        return both(jnp.sin(phases) @ each), jumping * numbers[-1]
 
-    def nothing():
-        return jnp.zeros(_KNOTS), jnp.zeros(()), jnp.zeros(())
-
-    def of(one: Primitive, own):
-        def form():
-            apart = _array(0.0 if one.apart is None else one.apart(own))
-            return one.function(place, own), apart, one.jump * own[0]
+    def of(one: Primitive):
+        def form(own):
+            apart = None if one.apart is None else one.apart(own)
+            return both(one.function(place, own), apart), one.jump * own[0]
 
         return form
 
-    table, softened, jump = nothing()[0], nothing()[0], jnp.zeros(())
-    for k, own in enumerate(_divided(numbers, forms)):
-        empty = nothing if k else sines
-        options = [empty, *(of(one, own) for one in PRIMITIVES)]
-        part, apart, change = jax.lax.switch(forms[k].astype(int), options)
-        table, jump = table + part, jump + change
-        if stride is not None:
-            reach = jnp.minimum(stride, apart * (high - low))
-            softened += _shares(knots, reach) @ part
-    return (table, None if stride is None else softened), jump
+    options = [nothing, sines, *map(of, PRIMITIVES)]
+
+    def add(total, part):
+        which, own = part
+        return jax.tree.map(jnp.add, total, jax.lax.switch(which, options, own)), None
+
+    # without any form, the function is a sum of sines
+    alone = (jnp.arange(MOST_PARTS) == 0).astype(int)
+    which = jnp.where(forms > 0, forms.astype(int) + 1, alone)
+    # in a loop, the forms are compiled once
+    total, _ = jax.lax.scan(add, nothing(None), (which, _divided(numbers, forms)))
+    return total
 
 
-def _divided(numbers, forms):
+def _divided(numbers, forms) -> Float[Array, "m p"]:
     """Return the parameters of each of several forms, those of one after another."""
-    counts = jnp.array([0, *(one.count for one in PRIMITIVES)])
+    counts = jnp.array([0, *(one.count for one in PRIMITIVES)])[forms.astype(int)]
+    first = jnp.cumsum(counts) - counts
     every = jnp.pad(jnp.stack(numbers), (0, MOST_NUMBERS))
-    first, divided = jnp.asarray(0), []
-    for form in forms:
-        own = jax.lax.dynamic_slice(every, (first,), (MOST_NUMBERS,))
-        divided.append(tuple(own[k] for k in range(MOST_NUMBERS)))
-        first = first + counts[form.astype(int)]
-    return divided
+    return every[first[:, None] + jnp.arange(MOST_NUMBERS)[None]]
 
 
 @jax.jit
