@@ -52,7 +52,8 @@ def table(
         for point in branch.points
         if point.kind != "regular" or (every and point.label % every == 0)
     ]
-    for head, cells in zip(heads, zip(*rows)):
+    for k, head in enumerate(heads):
+        cells = [row[k] for row in rows]
         # a long heading or name may be broken, but a number must not be cut
         words = head == "type"
         parts = [part for cell in cells for part in (cell.split() if words else [cell])]

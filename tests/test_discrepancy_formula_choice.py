@@ -51,7 +51,7 @@ def chosen(monkeypatch, unchecked_types):
             score = scores[primitive]
             return None if score is None else _trial(score)
 
-        likelihood = types.SimpleNamespace(gain=gain)
+        likelihood = types.SimpleNamespace(gain=gain, price=10.0, freedom=80.0)
         monkeypatch.setattr(
             _formulas,
             "CurveLikelihood",
@@ -73,6 +73,7 @@ class Form(str):
     """A form that is only a name."""
 
     special: Any = None
+    count: int = 5
 
     @property
     def name(self):
@@ -117,9 +118,9 @@ def test_a_form_is_fitted_once(chosen):
 
 
 def test_a_sum_is_fitted_if_no_form_alone_is_kept(chosen):
-    """The curve has a gain of 5000 and a cost of 1000; its score is 1000."""
+    """The curve has a gain of 5000 and parameters worth 80."""
     wave, both = Form("wave"), Form("wave + wave")
-    sums = {both: (4990.0, 960.0)}
+    sums = {both: (4930.0, 960.0)}
     score, tried = chosen({wave: (40.0, 1011.0)}, sums, gain=5000.0)
     assert tried == ["wave", "wave + wave"] and score == 960.0
     score, tried = chosen({wave: (40.0, 1009.0)}, sums, gain=5000.0)
@@ -127,9 +128,10 @@ def test_a_sum_is_fitted_if_no_form_alone_is_kept(chosen):
 
 
 def test_a_sum_that_promises_less_than_the_curve_is_not_fitted(chosen):
-    """By more than the 60 that are allowed for an inaccurate prediction."""
+    """By more than the 60 that are allowed for an inaccurate prediction: the price of
+    the curve is 80, and that of the sum 50."""
     wave, both = Form("wave"), Form("wave + wave")
-    for gain, fitted in ((4935.0, 1), (4945.0, 2)):
+    for gain, fitted in ((4855.0, 1), (4865.0, 2)):
         sums = {both: (gain, 960.0)}
         _, tried = chosen({wave: (40.0, None)}, sums, gain=5000.0)
         assert len(tried) == fitted

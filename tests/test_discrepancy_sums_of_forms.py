@@ -119,3 +119,8 @@ def test_a_sum_is_within_the_range_if_its_parts_are():
     assert both.within([1.0, 0.3, 2.0, 0.4, 0.6])
     assert not both.within([1.0, 1.3, 2.0, 0.4, 0.6])
     assert not both.within([1.0, 0.3, 2.0, 0.6, 0.4])
+
+
+def test_a_function_that_the_data_do_not_determine_has_no_sum():
+    likelihood = _likelihood(Variable.PHASE, 0.0)
+    assert SumSearch(likelihood).promising(3) == []

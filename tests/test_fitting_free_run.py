@@ -238,7 +238,9 @@ def test_switching_events_between_two_samples_are_located():
 
 
 def test_a_free_run_that_switches_too_often_says_so():
-    with pytest.raises(ValueError, match="at least 4 switching events between the sample at"):
+    with pytest.raises(
+        ValueError, match="at least 4 switching events between the sample at"
+    ):
         _rattling(0.48)
 
 

@@ -193,7 +193,7 @@ def _draw(branch, model, axis: Axis, folder: Path) -> Path:
     figure = branch_diagram(
         branch,
         x_label=axis.label,
-        y_label=(names[0], units[0]) if names else ("state", "-"),
+        y_label=(names[0] if names else "state", units[0] if units else ""),
         x_scale=1 / axis.unit,
     )
     return save_figure(figure, folder / "branch.png")

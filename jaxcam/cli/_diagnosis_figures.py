@@ -135,11 +135,11 @@ def _maps(plt, found: Diagnosis):
         layout="constrained",
         squeeze=False,
     )
-    end = float(norm.isf(0.005 / (_BINS * len(every) * 2)))
+    names = list(dict.fromkeys(title_of(part, every) for part in every))
+    end = float(norm.isf(0.005 / (_BINS * len(names) * len(sides))))
     image = None
     for column, parts, which in zip(axes.T, found.unseen, ("before", "after")):
         for axis, resting in zip(column, sides):
-            names = list(dict.fromkeys(title_of(part, every) for part in parts))
             rows = [
                 _binned(
                     [p for p in parts if title_of(p, every) == name], resting, along

@@ -24,8 +24,9 @@ def fit(
         ),
     ] = 0,
     iterations: Annotated[
-        int, typer.Option(metavar="N", help="Maximum number of iterations.")
-    ] = 60,
+        int | None,
+        typer.Option(metavar="N", help="Maximum number of iterations. Default: 60."),
+    ] = None,
     json_file: Annotated[
         Path | None,
         typer.Option(
@@ -56,7 +57,7 @@ def fit(
       jaxcam fit impacts.csv
     """
     files.check()
-    if iterations < 1:
+    if iterations is not None and iterations < 1:
         raise ValueError(f"--iterations is {iterations}; give a positive number.")
     if bootstrap < 0 or bootstrap == 1:
         raise ValueError(f"--bootstrap is {bootstrap}; give 0, or at least 2.")
@@ -66,10 +67,11 @@ def fit(
 
     keep_compiled_programs()
     if rig is None and system is None and is_table(case, files):
-        if out is not None or bootstrap:
+        if out is not None or bootstrap or iterations is not None:
             raise ValueError(
-                f"{case} is a table of impacts, for which there are no figures and no "
-                "bootstrap; leave out --out and --bootstrap."
+                f"{case} is a table of impacts, for which there are no figures, no "
+                "bootstrap and no iterations; leave out --out, --bootstrap and "
+                "--iterations."
             )
         fit_impacts(case, files, json_file)
         return
@@ -84,7 +86,7 @@ def fit(
     runs, nominal = read(case, rig, files, system)
     output = Output(json_file, out)
     with progress("finding impacts and contacts") as report:
-        found = fitted(runs, nominal, bootstrap, iterations, report)
+        found = fitted(runs, nominal, bootstrap, iterations or 60, report)
         figures = []
         if out is not None:
             report("drawing", None)

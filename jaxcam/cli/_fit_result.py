@@ -53,10 +53,10 @@ class Result:
             f"{len(self.problem.records)} recordings is {ratio:.3f} times the sensor "
             "noise."
         )
-        if ratio > Policy().as_noise:
+        if ratio > Policy().as_noise and len(self.problem.records) > 1:
             sentence += (
-                " The model lacks something; to find out what, run `jaxcam diagnose` "
-                "with the same files."
+                " The model is incomplete, or the noise is larger than stated; "
+                "`jaxcam diagnose` with the same files seeks what is missing."
             )
         return sentence
 

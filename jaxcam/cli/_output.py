@@ -10,8 +10,14 @@ from typing import Any
 import numpy as np
 import typer
 from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
 
 from ._lock import hold
+
+
+# more columns than any table has
+_WIDEST = 10_000
 
 
 class Output:
@@ -48,8 +54,18 @@ class Output:
         self.console = Console(quiet=self.to_stdout, highlight=False)
 
     def print(self, *what) -> None:
-        """Print tables as tables, and sentences unchanged."""
-        self.console.print(*what, markup=False)
+        """Print tables as tables, and sentences unchanged.
+
+        A table that is wider than the terminal is not cut.
+        """
+        wide = self.console.options.update(max_width=_WIDEST)
+        needed = [
+            Measurement.get(self.console, wide, one).minimum
+            for one in what
+            if isinstance(one, Table)
+        ]
+        width = max(self.console.width, *needed) if needed else None
+        self.console.print(*what, markup=False, width=width, crop=not needed)
 
     def print_figures(self, files: Sequence[Path]) -> None:
         """Print the location of the figures, if any."""

@@ -77,6 +77,11 @@ class Policy:
         "the fraction of the explained cost that may remain",
     )
     form_loss: float = _decides(10.0, "largest loss in BIC of a formula that is kept")
+    tie: float = _decides(
+        10.0,
+        "difference in BIC up to which another subset is reported as equally good (a "
+        "larger difference is very strong evidence: Kass and Raftery 1995)",
+    )
     elsewhere: float = _decides(
         0.5,
         "another location is chosen if it leaves less than this fraction of a residual",
@@ -289,11 +294,6 @@ class Policy:
     )
     decoy: float = _shows(
         0.5, "fraction of a function's gain that its decoy may reach without a caveat"
-    )
-    tie: float = _shows(
-        10.0,
-        "difference in BIC up to which another subset is reported as equally good (a "
-        "larger difference is very strong evidence: Kass and Raftery 1995)",
     )
     moved_errors: float = _shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"

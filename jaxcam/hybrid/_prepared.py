@@ -20,10 +20,12 @@ def prepared(system: HybridSystem) -> HybridSystem:
     if is_traced(system):
         return _by_xla(system)
     key = structure_of(system), digest_of(system)
-    if key[0] is None:
+    # made without a lock, because a user's function may itself run a simulation
+    ready = _READY.find(key) if key[0] is not None else None
+    if ready is None:
         ready = _by_xla(system)
-    else:
-        ready = _READY.get(key, lambda: _by_xla(system))
+        if key[0] is not None:
+            _READY.keep(key, ready)
     _LATEST.keep(system, ready)
     return ready
 

@@ -35,10 +35,20 @@ class Cache:
                 return self._results[key]
             made = make()
             if keeps(made):
-                while len(self._results) >= self._most:
-                    del self._results[next(iter(self._results))]
-                self._results[key] = made
+                self.keep(key, made)
             return made
+
+    def find(self, key: Hashable) -> Any:
+        """Return the result for a key, or `None`."""
+        with self._lock:
+            return self._results.get(key)
+
+    def keep(self, key: Hashable, result: Any) -> None:
+        """Keep the result for a key."""
+        with self._lock:
+            while len(self._results) >= self._most:
+                del self._results[next(iter(self._results))]
+            self._results[key] = result
 
     def clear(self) -> None:
         """Discard all results."""

@@ -1,4 +1,4 @@
-"""Detect invalid input before anything is compiled; each message states the remedy."""
+"""Detect invalid input; each message states the remedy."""
 
 import equinox as eqx
 import jax

@@ -115,7 +115,7 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
     inclusion |= {one.term: one.parameter.chance for one in beyond if one.term}
     missing, needed_parts, others = None, None, ()
     left = [one for one in left_after if one.significant]
-    different = differing(best.fit, trials.policy)
+    different = differing(best.fit, trials.policy, best.count)
     settled = _settled(different, left, best.bic, trials.policy)
     without = None
     if left and best.names:
@@ -176,8 +176,8 @@ def choose(question: Question, trials: Trials, seed: int) -> Choice:
 def _fewest(
     different: Differing | None, without: Differing | None, bic: float, policy: Policy
 ) -> Differing | None:
-    """Return the separate values that explain the data with the smallest BIC, if it is
-    smaller than that of the named terms.
+    """Return the separate values with the smallest BIC, if it is smaller than that of
+    the named terms; in a tie, those without these terms.
 
     **Arguments:** separate values in addition to the named terms, and without them; the
     BIC of the terms.

@@ -22,6 +22,7 @@ class Differing(NamedTuple):
         explain; `left`: rms of the residual that remains, relative to the noise;
         `complete`: whether only noise remains.
     - `gained`: reduction of the cost; `fit`: the fit with separate values.
+    - `terms`: number of parameters of named terms in this fit.
     """
 
     name: str
@@ -34,13 +35,13 @@ class Differing(NamedTuple):
     complete: bool
     gained: float
     fit: Fit
+    terms: int = 0
 
     @property
     def bic(self) -> float:
-        """Cost of the fit plus the penalty for its additional values."""
-        return self.fit.cost + (len(self.records) - 1) * math.log(
-            self.fit.problem.samples
-        )
+        """Cost of the fit, and the price of its additional parameters."""
+        count = self.terms + len(self.records) - 1
+        return self.fit.cost + count * math.log(self.fit.problem.samples)
 
     def to_json(self) -> dict:
         """Return the numbers, for a file."""
@@ -59,11 +60,13 @@ def above_noise(cost: float, samples: int, policy: Policy) -> bool:
     return cost > samples + policy.cost_errors * math.sqrt(2 * samples)
 
 
-def differing(found: Fit, policy: Policy) -> Differing | None:
+def differing(found: Fit, policy: Policy, terms: int = 0) -> Differing | None:
     """Return the free parameter whose separate values explain most of the residual.
 
     The gain of separate values must be significant, and the values estimated from one
     half of each recording must improve the prediction of the other half.
+
+    **Arguments:** `terms`: the number of parameters of named terms.
 
     **Returns:** `None` if nothing remains above the noise, if there is only one
     recording, or if no separate values explain enough of the residual.
@@ -83,7 +86,7 @@ def differing(found: Fit, policy: Policy) -> Differing | None:
         if gains[name] > least and _foretold(halves, name) > 0:
             one = _separated(found, name, policy, share)
             if one.share >= share:
-                best, share = one, one.share
+                best, share = one._replace(terms=terms), one.share
     return best
 
 

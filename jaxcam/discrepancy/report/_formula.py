@@ -105,7 +105,7 @@ def formula_of(
         if kind == "restitution" and own[0] < 0:
             sentence = sentence.replace("grows", "falls").replace("decays", "recovers")
         sentences.append(sentence)
-        if not primitive.parts:
+        if family.where is Where.SENSOR or not primitive.parts:
             mechanism = _mechanism(family, part, own, values)
     text = " + ".join(texts).replace("+ -", "- ")
     says = " and also ".join(sentences)

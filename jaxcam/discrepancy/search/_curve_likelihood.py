@@ -37,8 +37,8 @@ class CurveLikelihood(NamedTuple):
     parameters eliminated.
 
     Functions with coefficients c reduce the cost by `2 c @ slope - c @ information @
-    c`, both divided by the cost per sample. `gain`: that of the fitted function.
-    `price`: the gain that a parameter requires.
+    c`, both divided by the cost per sample. `gain`: that of the fitted function, and
+    `freedom`: the price of its coefficients; `price`: that of a parameter.
     """
 
     family: Family
@@ -46,6 +46,7 @@ class CurveLikelihood(NamedTuple):
     slope: Float[np.ndarray, " k"]
     gain: float
     price: float
+    freedom: float = 0.0
 
     @classmethod
     def about(cls, fits: FreeFits, found: Missing, one: Free) -> "CurveLikelihood":
@@ -58,7 +59,10 @@ class CurveLikelihood(NamedTuple):
         value = np.asarray(found.fit.point.values)[0, columns]
         slope = inside @ value + pull
         gain = float(2 * value @ slope - value @ inside @ value)
-        return cls(one.family, inside, slope, gain, math.log(found.problem.samples))
+        spread = np.outer(one.spread, one.spread)
+        freedom = np.sum(np.log1p(np.maximum(np.linalg.eigvalsh(inside * spread), 0)))
+        price = math.log(found.problem.samples)
+        return cls(one.family, inside, slope, gain, price, float(freedom))
 
     def sines_of(
         self, primitive: Primitive, numbers: Float[np.ndarray, "n p"]
@@ -79,11 +83,6 @@ class CurveLikelihood(NamedTuple):
         """Return all starting values of the parameters of a form of size one."""
         starts = np.array(list(itertools.product((1.0,), *primitive.starts)))
         return starts.reshape(-1, primitive.count)
-
-    def gain_of(self, sines: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n"]:
-        """Return the predicted gain of functions with given coefficients."""
-        curved = np.einsum("...a,ab,...b->...", sines, self.information, sines)
-        return 2 * sines @ self.slope - curved
 
 
 @functools.lru_cache(maxsize=8)

@@ -108,9 +108,10 @@ class _Trials:
         """Return whether a form is expected to have about as much evidence as the
         function.
         """
-        worse = heat_of(self.found.fit) * (likelihood.gain - start.gain)
-        allowed = self.fits.policy.form_loss + self.fits.policy.leads
-        return self.found.fit.cost + worse < self.found.score + allowed
+        price = start.primitive.count * likelihood.price
+        lost = heat_of(self.found.fit) * (likelihood.gain - start.gain - price)
+        worse = lost + price - likelihood.freedom
+        return worse < self.fits.policy.form_loss + self.fits.policy.leads
 
 
 def _in_slot(found: Missing, slot: str):

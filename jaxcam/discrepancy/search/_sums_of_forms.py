@@ -151,8 +151,9 @@ class SumSearch:
             numbers.append(starts)
             seen.append(here)
             first += len(starts)
-        sizes = np.concatenate([own[:, 0] for own in numbers])
-        return _Grid(tuple(forms), rows, numbers, np.concatenate(seen), sizes)
+        sizes = np.concatenate([np.zeros(0), *(own[:, 0] for own in numbers)])
+        seen = np.concatenate([np.zeros((0, len(self.best))), *seen])
+        return _Grid(tuple(forms), rows, numbers, seen, sizes)
 
     def _pairs(self) -> Iterator[_Sum]:
         """Yield the best pair of every two forms on the grid."""
