@@ -29,7 +29,7 @@ def chosen(monkeypatch, unchecked_types):
     """The form that is kept, and those that were fitted, for predicted gains and
     scores of forms and of sums of them; the curve has a score of 1000."""
 
-    def choose(forms, sums=(), gain=0.0):
+    def choose(forms, sums=(), gain=0.0, small=1e5):
         tried = []
         curve = _trial(1000.0)
         sums = dict(sums)
@@ -49,7 +49,7 @@ def chosen(monkeypatch, unchecked_types):
                 # the special case starts from the fitted numbers but the last
                 assert numbers.tolist() == [0.0, 1.0]
             score = scores[primitive]
-            return None if score is None else _trial(score)
+            return None if score is None else _trial(score, 1500.0)
 
         likelihood = types.SimpleNamespace(gain=gain, price=10.0, freedom=80.0)
         monkeypatch.setattr(
@@ -59,11 +59,11 @@ def chosen(monkeypatch, unchecked_types):
         )
         monkeypatch.setattr(_formulas, "promising", lambda *_: ranked(forms))
         search = types.SimpleNamespace(promising=lambda _: ranked(sums))
-        monkeypatch.setattr(_formulas, "SumSearch", lambda _: search)
+        monkeypatch.setattr(_formulas, "SumSearch", lambda *_: search)
         monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
         monkeypatch.setattr(_formulas, "_fitted", fitted)
         fits = types.SimpleNamespace(policy=Policy())
-        found, _ = _formulas.formulated(fits, curve, None, 1e5, lambda *_: None)
+        found, _ = _formulas.formulated(fits, curve, None, small, lambda *_: None)
         return found.score, tried
 
     return choose
@@ -121,9 +121,9 @@ def test_a_sum_is_fitted_if_no_form_alone_is_kept(chosen):
     """The curve has a gain of 5000 and parameters worth 80."""
     wave, both = Form("wave"), Form("wave + wave")
     sums = {both: (4930.0, 960.0)}
-    score, tried = chosen({wave: (40.0, 1011.0)}, sums, gain=5000.0)
+    score, tried = chosen({wave: (40.0, 1011.0)}, sums, gain=5000.0, small=100.0)
     assert tried == ["wave", "wave + wave"] and score == 960.0
-    score, tried = chosen({wave: (40.0, 1009.0)}, sums, gain=5000.0)
+    score, tried = chosen({wave: (40.0, 1009.0)}, sums, gain=5000.0, small=100.0)
     assert tried == ["wave"] and score == 1009.0
 
 
@@ -133,5 +133,13 @@ def test_a_sum_that_promises_less_than_the_curve_is_not_fitted(chosen):
     wave, both = Form("wave"), Form("wave + wave")
     for gain, fitted in ((4855.0, 1), (4865.0, 2)):
         sums = {both: (gain, 960.0)}
-        _, tried = chosen({wave: (40.0, None)}, sums, gain=5000.0)
+        _, tried = chosen({wave: (40.0, None)}, sums, gain=5000.0, small=100.0)
         assert len(tried) == fitted
+
+
+def test_a_form_that_leaves_little_needs_no_sum(chosen):
+    """It leaves 500 more than the curve, where 1000 are tolerated."""
+    wave, both = Form("wave"), Form("wave + wave")
+    sums = {both: (4930.0, 960.0)}
+    _, tried = chosen({wave: (40.0, 1011.0)}, sums, gain=5000.0, small=1000.0)
+    assert tried == ["wave"]

@@ -124,3 +124,14 @@ def test_a_sum_is_within_the_range_if_its_parts_are():
 def test_a_function_that_the_data_do_not_determine_has_no_sum():
     likelihood = _likelihood(Variable.PHASE, 0.0)
     assert SumSearch(likelihood).promising(3) == []
+
+
+def test_a_part_that_hardly_counts_is_left_out():
+    """It has 0.04 % of the gain of the other, although it is significant."""
+    true = {"harmonic_1": [(1.0, 0.4)], "harmonic_3": [(0.02, 1.9)]}
+    likelihood = _likelihood(Variable.PHASE, 1e6, **true)
+    (every, *_) = SumSearch(likelihood).promising(1)
+    assert {"harmonic 1", "harmonic 3"} <= {one.name for one in every.primitive.parts}
+    for start in SumSearch(likelihood, 0.15**2).promising(3):
+        sizes = [own[0] for _, own in start.primitive.divided(start.numbers)]
+        assert min(map(abs, sizes)) > 0.05

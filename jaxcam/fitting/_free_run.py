@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -236,7 +236,7 @@ def simulated(model: Model, one: Prepared) -> Simulated:
     step = one.interval / one.steps
     size = one.state.shape[0] - len(filtered_channels(model))
 
-    def seen(t, system, x, field, events=0):
+    def seen(t, system, x, field, events: Any = 0):
         values = []
         for name, sensor in model.sensors.items():
             if sensor.filtered:

@@ -38,8 +38,9 @@ def formulated(
         likelihood = CurveLikelihood.about(fits, found, one)
         trials = _Trials(fits, found, apart, one, small, progress)
         trials.run(promising(likelihood, fits.policy.followed))
-        if trials.kept is None:
-            sums = SumSearch(likelihood).promising(fits.policy.followed)
+        if trials.kept is None and not trials.close:
+            search = SumSearch(likelihood, fits.policy.small)
+            sums = search.promising(fits.policy.followed)
             trials.run([start for start in sums if trials.may_do(start, likelihood)])
         tried += trials.sound
         found = trials.kept or found
@@ -73,6 +74,12 @@ class _Trials:
         best = min(self.sound, key=lambda trial: trial.score, default=self.found)
         allowed = self.found.score + self.fits.policy.form_loss
         return best if self.sound and best.score < allowed else None
+
+    @property
+    def close(self) -> bool:
+        """Return whether a form explains almost as much as the function."""
+        allowed = self.found.fit.cost + self.small
+        return any(trial.fit.cost < allowed for trial in self.sound)
 
     def run(self, waiting: list[Start]) -> None:
         """Fit forms in turn, until the next cannot have more evidence.

@@ -25,6 +25,7 @@ from ._hidden_leads import simplified
 from ._hidden_signals import driven_by
 from ._hidden_state import started
 from ._leads import Lead, Leads, shows_apart
+from ._left_out import LeftOut
 from ._recentre import recentred
 from ._slots import (
     emptied,
@@ -71,6 +72,7 @@ class FreeSearch:
         self.problem = roomy(problem, self.families[0], gaps, room)
         # gain, offset and lag of a sensor are not unnamed functions
         faults = own_faults(self.problem.model, self.problem.parameters)
+        self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
@@ -99,13 +101,8 @@ class FreeSearch:
         found = self._pruned(whole)
         found = simplified(self.fits, self.problem, found, self.progress)
         curve, found = found, self._formulated(found)
-        few = len(found.functions) < len(whole.functions)
-        if (
-            few
-            and leaves_noise(self.fits, whole)
-            and not leaves_noise(self.fits, found)
-        ):
-            # the form does not make up for the function that was left out
+        if self._lacks(found, whole):
+            # no form makes up for the functions or terms that were left out
             curve, found = whole, self._formulated(whole)
         if len(found.functions) > 1 or found.names:
             return found
@@ -122,6 +119,21 @@ class FreeSearch:
             if score < best:
                 found, best = other, score
         return found
+
+    def _lacks(self, found: Missing, whole: Missing) -> bool:
+        """Return whether functions or terms that were left out of a fit are needed.
+
+        This is the case if only the fit with them leaves noise, or if the fit is far
+        from the data and they explain most of what remains.
+        """
+        few, many = (len(one.functions) + len(one.names) for one in (found, whole))
+        if few == many or leaves_noise(self.fits, found):
+            return False
+        if leaves_noise(self.fits, whole):
+            return True
+        samples, policy = found.problem.samples, self.policy
+        left, rest = found.fit.cost - samples, whole.fit.cost - samples
+        return heat_of(found.fit) > policy.near and rest < policy.explains * left
 
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
@@ -282,7 +294,7 @@ class FreeSearch:
         A function found far from the data may represent two effects.
         """
         for out in (*found.functions, *sorted(found.names)):
-            rest, point = self._without(found, out)
+            rest, point = self.left_out.subset(found, out)
             rival = self._rival(found, out)
             if rival is None:
                 continue
@@ -303,7 +315,7 @@ class FreeSearch:
         names = [t.name for t in self.terms if t.name not in found.names]
         problem = filled(self.problem, found.functions)
         free = self.fits.free(found)
-        kept = self.fits.free(self._without(found, out)[0])
+        kept = self.fits.free(self.left_out.subset(found, out)[0])
         strengths = {t: [s.name for s in self._term(t).strengths()] for t in names}
         every = [name for own in strengths.values() for name in own]
         blocks = blocks_of(problem, found.fit.point, names=[*free, *every])
@@ -329,32 +341,10 @@ class FreeSearch:
     def without(self, found: Missing, label: str) -> Missing:
         """Return the fit without the function or term of a label."""
         labels = {one.label: one for one in found.functions}
-        return self.fits.fitted(*self._without(found, labels.get(label, label)))
-
-    def _without(self, found: Missing, out: Part | str) -> tuple[Subset, Point]:
-        """Return the subset without a function or a term, and a start for its fit."""
-        slot = "" if isinstance(out, str) else out.slot
-        functions = tuple(f for f in found.functions if f.slot != slot)
-        names = found.names - {out} if isinstance(out, str) else found.names
-        values = found.fit.point.values
-        if not isinstance(out, str):
-            values = emptied(self.problem, values, out.slot)
-        else:
-            rows = [
-                self.problem.names.index(s.name) for s in self._term(out).strengths()
-            ]
-            values = np.asarray(values).copy()
-            values[:, rows] = 0.0
-        point = found.fit.point._replace(values=values)
-        return Subset(self.problem, functions, names), point
+        return self.fits.fitted(*self.left_out.subset(found, labels.get(label, label)))
 
     def _pruned(self, found: Missing) -> Missing:
         """Return the fit without the functions and terms that are not needed."""
-        for one in (*found.functions, *sorted(found.names)):
-            if len(found.functions) + len(found.names) < 2:
-                break
-            less = self.fits.fitted(*self._without(found, one))
-            heat = heat_of(found.fit)
-            if less.score - found.score < max(heat * self._least(), self._small(found)):
-                found = less
-        return found
+        return self.left_out.pruned(
+            found, lambda one: max(heat_of(one.fit) * self._least(), self._small(one))
+        )

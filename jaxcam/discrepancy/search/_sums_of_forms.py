@@ -97,10 +97,13 @@ class SumSearch:
 
     In its units, a function is a vector, and the cost of the difference of two
     functions is its square. `best` is the function with the largest likelihood.
+
+    **Arguments:** the likelihood; and the share of its gain below which a part of a sum
+    does not count.
     """
 
-    def __init__(self, likelihood: CurveLikelihood):
-        self.likelihood = likelihood
+    def __init__(self, likelihood: CurveLikelihood, least: float = 0.0):
+        self.likelihood, self.least = likelihood, least
         values, vectors = np.linalg.eigh(likelihood.information)
         kept = values > 0
         self.root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
@@ -220,7 +223,7 @@ class SumSearch:
 
     def _refined(self, sums: Sequence[_Sum]) -> list[_Sum]:
         """Return the best sums near given ones, without those whose parameters make no
-        sense or whose parts are alike.
+        sense or in which a part does not count.
         """
         found = []
         for one in sums:
@@ -237,15 +240,17 @@ class SumSearch:
             gain -= form.count * self.likelihood.price
             best = one._replace(gain=gain, numbers=start + scales * result.x)
             sensible = form.within(best.numbers) and np.isfinite(gain)
-            if sensible and not self._alike(best):
+            if sensible and self._counts(best):
                 found.append(best)
         return found
 
-    def _alike(self, one: _Sum) -> bool:
-        """Return whether the data do not tell two parts of a sum apart."""
+    def _counts(self, one: _Sum) -> bool:
+        """Return whether every part of a sum is large enough, and the data tell it from
+        the others.
+        """
         each = [self._seen(*own) for own in zip(one.parts, one.own)]
-        sizes = [np.linalg.norm(own) for own in each]
-        if not all(sizes):
-            return True
-        units = np.array([own / size for own, size in zip(each, sizes)])
-        return bool(np.any(np.triu(units @ units.T, 1) ** 2 > _ALIKE))
+        sizes = np.array([np.linalg.norm(own) for own in each])
+        if not np.all(sizes**2 > self.least * (self.best @ self.best)):
+            return False
+        units = np.array(each) / sizes[:, None]
+        return bool(np.all(np.triu(units @ units.T, 1) ** 2 <= _ALIKE))

@@ -1,0 +1,74 @@
+"""Fits without one of the functions or terms that were found."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ...fitting import Problem
+from ...fitting.engine import Point
+from ..policy import Policy
+from ..terms import Term
+from ._blocks import blocks_of, values_of
+from ._free_fits import FreeFits, Missing, Subset
+from ._gains import gain
+from ._slots import emptied, filled, Part
+
+
+class LeftOut:
+    """Fits without a function or term.
+
+    **Arguments:** the fits, the candidate terms, the problem with slots for functions,
+    and the policy.
+    """
+
+    def __init__(
+        self, fits: FreeFits, terms: Sequence[Term], problem: Problem, policy: Policy
+    ):
+        self.fits, self.problem, self.policy = fits, problem, policy
+        self.strengths = {t.name: [one.name for one in t.strengths()] for t in terms}
+
+    def subset(self, found: Missing, out: Part | str) -> tuple[Subset, Point]:
+        """Return the subset without a function or a term, and a start for its fit."""
+        slot = "" if isinstance(out, str) else out.slot
+        functions = tuple(f for f in found.functions if f.slot != slot)
+        names = found.names - {out} if isinstance(out, str) else found.names
+        values = found.fit.point.values
+        if isinstance(out, str):
+            rows = [self.problem.names.index(name) for name in self.strengths[out]]
+            values = np.asarray(values).copy()
+            values[:, rows] = 0.0
+        else:
+            values = emptied(self.problem, values, out.slot)
+        point = found.fit.point._replace(values=values)
+        return Subset(self.problem, functions, names), point
+
+    def predicted_loss(self, found: Missing, out: Part | str) -> float:
+        """Return the increase of the cost without a function or a term, according to
+        the quadratic likelihood about the fit.
+        """
+        free, kept = self.fits.free(found), self.fits.free(self.subset(found, out)[0])
+        problem = filled(found.problem, found.functions)
+        blocks = blocks_of(problem, found.fit.point, names=free)
+        information, score = blocks.total()
+        step = np.zeros(len(blocks.names))
+        gone = blocks.rows(set(free) - set(kept))
+        step[gone] = -values_of(found.fit, blocks)[gone]
+        worse = step @ information @ step - 2 * step @ score
+        moved = score - information @ step
+        return worse - gain(information, moved, blocks.rows(kept))
+
+    def pruned(self, found: Missing, allowed: Callable[[Missing], float]) -> Missing:
+        """Return the fit without the functions and terms that are not needed.
+
+        **Arguments:** the increase of the score that is `allowed` without one of them.
+        """
+        for one in (*found.functions, *sorted(found.names)):
+            if len(found.functions) + len(found.names) < 2:
+                break
+            least = allowed(found)
+            if self.predicted_loss(found, one) > self.policy.clear * least:
+                continue
+            less = self.fits.fitted(*self.subset(found, one))
+            if less.score - found.score < least:
+                found = less
+        return found

@@ -1,0 +1,67 @@
+"""Which functions and terms may be left out of a fit."""
+
+import types
+
+import pytest
+
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search._free_search import FreeSearch
+from jaxcam.discrepancy.search._left_out import LeftOut
+
+
+def _found(functions, cost, samples=1000, score=None, names=frozenset()):
+    problem = types.SimpleNamespace(samples=samples)
+    return types.SimpleNamespace(
+        functions=tuple(types.SimpleNamespace(slot=one) for one in functions),
+        names=names,
+        fit=types.SimpleNamespace(cost=cost, problem=problem),
+        problem=problem,
+        score=cost if score is None else score,
+    )
+
+
+@pytest.mark.parametrize(
+    "left, rest, needed",
+    [
+        # a fit to the noise needs nothing
+        (1000.0, 990.0, False),
+        # only the fit with all of them leaves noise
+        (1500.0, 1000.0, True),
+        # far from the data, they must explain half of what remains
+        (100_000.0, 20_000.0, True),
+        (100_000.0, 60_000.0, False),
+        # near the data, an imperfect form may leave as much
+        (3000.0, 1900.0, False),
+    ],
+)
+def test_functions_that_explain_most_of_the_rest_are_kept(
+    left, rest, needed, unchecked_types
+):
+    search = object.__new__(FreeSearch)
+    search.policy = Policy()
+    search.fits = types.SimpleNamespace(policy=Policy())
+    fewer, whole = _found(["a"], left), _found(["a", "b"], rest)
+    assert search._lacks(fewer, whole) is needed
+    assert not search._lacks(whole, whole)
+
+
+def test_a_function_that_explains_much_is_not_fitted_without(
+    monkeypatch, unchecked_types
+):
+    """The quadratic likelihood predicts a loss of more than ten times what is
+    allowed for `a`; `b` is not needed."""
+    tried = []
+
+    def fitted(subset, point):
+        tried.append(subset)
+        return _found(["a"], 1010.0)
+
+    one = object.__new__(LeftOut)
+    one.policy, one.fits = Policy(), types.SimpleNamespace(fitted=fitted)
+    losses = {"a": 5000.0, "b": 10.0}
+    monkeypatch.setattr(
+        LeftOut, "predicted_loss", lambda self, found, out: losses[out.slot]
+    )
+    monkeypatch.setattr(LeftOut, "subset", lambda self, found, out: (out.slot, None))
+    found = one.pruned(_found(["a", "b"], 1000.0), lambda found: 100.0)
+    assert tried == ["b"] and len(found.functions) == 1
