@@ -1,15 +1,22 @@
 """`jaxcam continue`, as a reader types it."""
 
+import io
 import json
 import re
 import shlex
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.main import get_command
 from typer.testing import CliRunner
 
+import continuation
 from jaxcam.cli import app
+from jaxcam.cli._axis import Axis
+from jaxcam.cli._output import Output
+from jaxcam.cli._source import Source
+from jaxcam.data import NEW_RIG
 
 
 @pytest.fixture(autouse=True)
@@ -87,3 +94,26 @@ def test_bad_input_is_one_sentence(line, words):
     assert found.stdout == "" and words in found.stderr
     (sentence,) = found.stderr.splitlines()
     assert sentence.endswith(".")
+
+
+def test_a_table_wider_than_the_terminal_is_not_cut():
+    """At 30 columns, every number of a branch is complete."""
+    problem = continuation.Equilibrium(lambda u, p: p["a"] - u**2, {"a": 1.0})
+    branch = continuation.branch(problem, [1.0], "a", (-1, 2), direction=-1)
+    output = Output(None, None)
+    output.console = Console(width=30, file=io.StringIO(), record=True)
+    columns = {"a long heading": lambda point: point.parameter / 3}
+    output.print(continuation.table(branch, columns=columns))
+    text = output.console.export_text()
+    for point in branch.special:
+        assert f"{point.parameter:.9g}" in text and f"{point.parameter / 3:.6g}" in text
+    assert continuation.table(branch, columns={}).columns[0].header == "label"
+
+
+def test_axes_have_the_units_of_the_rig_file():
+    units = Source(None, NEW_RIG / "cart.toml").units()
+    assert units["stiffness"] == "1/s^2"
+    assert Axis.of("stiffness", "Cart", units).label == ("stiffness", "1/s^2")
+    # the unit of a parameter without one is unknown
+    assert Axis.of("restitution", "Cart", units).label == ("restitution", "")
+    assert Axis.of("speed", "cam-follower", units).label == ("speed", "rpm")

@@ -27,6 +27,7 @@ NUMBERS = {
     "power": (0.6, 2.2),
     "wave": (0.7, 2.3, 0.4),
     "forward": (0.6,),
+    "dry": (-0.4,),
     "falling": (0.6, 0.2),
     "curved above": (-3.0, 0.6, 1.5),
     "curved below": (3.0, 0.3, 2.0),
@@ -44,7 +45,11 @@ NUMBERS = {
 
 SUMS = {
     Variable.POSITION: [("above", "bump"), ("window", "straight", "dead zone")],
-    Variable.VELOCITY: [("forward", "cube"), ("falling", "power of speed")],
+    Variable.VELOCITY: [
+        ("forward", "cube"),
+        ("falling", "power of speed"),
+        ("dry", "falling", "fast"),
+    ],
     Variable.PHASE: [("harmonic 1", "harmonic 3"), ("arc", "harmonic 2", "half turn")],
 }
 ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
@@ -63,7 +68,7 @@ def _forms():
         family = _family(argument)
         for primitive in family.primitives:
             yield pytest.param(family, primitive, id=f"{argument} {primitive.name}")
-        forms = {one.name: one for one in family.primitives}
+        forms = {one.name: one for one in family.summands}
         for names in SUMS.get(argument, ()):
             both = sum_of([forms[name] for name in names], [1.0] * len(names))
             yield pytest.param(family, both, id=f"{argument} {both.name}")

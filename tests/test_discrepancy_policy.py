@@ -97,6 +97,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "STRAIGHT",
         "SQUARE",
         "CUBE",
+        "DRY",
         "FORWARD",
         # where a scan of edges, speeds and hidden elements looks, and in what chunks
         "_SHARES",

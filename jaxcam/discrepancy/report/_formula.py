@@ -23,6 +23,7 @@ _FORMULAS = {
     "exponential": "{size}*exp(({x} - {middle})/{reach})",
     "power": "{size}*({x}/{range})**{power}",
     "wave": "{size}*cos({wavenumber}*({x} - {low}) - {lead})",
+    "dry": "{size}*sign({x})",
     "forward": "{size}*({x} > 0)",
     "falling": "{size}*sign({x})*exp(-({x}/{decay})**2)",
     "curved above": "{size}*(max({x} - {a}, 0)/{range})**{exponent}",
@@ -50,6 +51,7 @@ _WORDS = {
     "exponential": "{trend} exponentially with the {x}, by a factor e over {span}",
     "power": "grows as the {x} to the power {power}",
     "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
+    "dry": "has a constant size and the direction of the {x}",
     "forward": "acts only while the {x} is positive",
     "falling": "opposes the motion near rest and decreases with the {x}, over about "
     "{decay}",

@@ -139,7 +139,7 @@ class SumSearch:
 
     def _grid(self) -> _Grid:
         forms, rows, numbers, seen, first = [], [], [], [], 0
-        for form in self.likelihood.family.primitives:
+        for form in self.likelihood.family.summands:
             starts = self.likelihood.starts_of(form)
             starts = starts[[form.within(own) for own in starts]]
             here = self.likelihood.sines_of(form, starts) @ self.root.T

@@ -14,6 +14,7 @@ from ._primitives import (
     OF_PHASE,
     OF_SPEED,
     ON_A_LINE,
+    ONLY_IN_SUMS,
     Primitive,
     STRAIGHT,
 )
@@ -108,6 +109,11 @@ class Family:
         if self.argument in (Variable.TIME, Variable.APPROACH):
             return (*ON_A_LINE, *FROM_ZERO)
         return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
+
+    @property
+    def summands(self) -> tuple[Primitive, ...]:
+        """Parametric forms of which a sum may replace a function of this family."""
+        return (*self.primitives, *(ONLY_IN_SUMS if self.jumps else ()))
 
     def waves(self, count: int) -> tuple[Array, Array]:
         """Return rates and shifts of `count` sines of the argument, each `(count,)`.

@@ -265,6 +265,7 @@ WAVE = Primitive(
     (_shares(0.75, 8.0, 30), _EVERY[::3]),
     (0.1, 0.3),
 )
+DRY = Primitive("dry", lambda at, p: p[0] + 0.0 * at.u, odd=True)
 FORWARD = Primitive("forward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=0.5)
 FALLING = Primitive(
     "falling",
@@ -340,9 +341,11 @@ ON_A_LINE = (
 )
 FROM_ZERO = (POWER,)
 OF_SPEED = (FORWARD, FALLING, FAST, POWER_OF_SPEED)
+# alone, it is a named term
+ONLY_IN_SUMS = (DRY,)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 
-PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE, *FROM_ZERO)
+PRIMITIVES = (*ON_A_LINE, *OF_SPEED, *OF_PHASE, *FROM_ZERO, *ONLY_IN_SUMS)
 """All forms, in the order of their indices in a compiled program."""
 MOST_NUMBERS = max(one.count for one in PRIMITIVES)
 """Largest number of parameters of a form that is not a sum."""
