@@ -18,8 +18,8 @@ from .problem import AbstractProblem, Start
 from .special import FLIP
 
 
-# minimum number of ordinary points on a branch of the cascade, if its length decreases
-# no faster than by the square of Feigenbaum's 2.5029
+# minimum number of regular points on a branch of the cascade whose length is that of
+# the branch before, divided by 2.5 (Feigenbaum's constant of the state)
 _POINTS = 10
 
 

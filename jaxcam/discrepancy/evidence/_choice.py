@@ -81,7 +81,8 @@ class Choice:
 
     @property
     def unexplained(self) -> list[Structure]:
-        """Return the significant remaining structures, the largest excess first."""
+        """Return the significant remaining structures: those with a shape first, each
+        kind by its excess over the threshold."""
         return [one for one in self.left_after if one.significant]
 
 

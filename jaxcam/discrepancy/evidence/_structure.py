@@ -80,9 +80,10 @@ class Structure:
     """Standard errors of `value`."""
 
     predicted_gain: float = math.inf
-    """If `gain` exceeds its threshold, the gain in the log-likelihood of one half of
-    the recordings when the effect is estimated from the other half. It is negative for
-    an effect that differs from recording to recording.
+    """If `gain` exceeds its threshold, the gain in twice the log-likelihood when the
+    effect in either half of the recordings is estimated from the other half, summed
+    over both halves. It is negative for an effect that differs from recording to
+    recording.
     """
     form: Form = Form.FUNCTION
     """An unlisted term, a free function, a vibration, or residuals that are correlated
