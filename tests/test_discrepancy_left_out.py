@@ -2,9 +2,11 @@
 
 import types
 
+import numpy as np
 import pytest
 
 from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search._blocks import _usable
 from jaxcam.discrepancy.search._free_search import FreeSearch
 from jaxcam.discrepancy.search._left_out import LeftOut
 
@@ -65,3 +67,12 @@ def test_a_function_that_explains_much_is_not_fitted_without(
     monkeypatch.setattr(LeftOut, "subset", lambda self, found, out: (out.slot, None))
     found = one.pruned(_found(["a", "b"], 1000.0), lambda found: 100.0)
     assert tried == ["b"] and len(found.functions) == 1
+
+
+def test_a_diverging_motion_has_no_information():
+    """Otherwise its eigenvalues are sought in vain."""
+    one = np.ones((2, 2))
+    assert _usable(one, one[0])
+    for wrong in (np.inf, np.nan, 1e200):
+        assert not _usable(one * wrong, one[0])
+        assert not _usable(one, one[0] * wrong)

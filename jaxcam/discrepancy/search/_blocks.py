@@ -84,6 +84,9 @@ def blocks_of(
             whole, right = np.zeros((size, size)), np.zeros(size)
             whole[np.ix_(rows, rows)] = found.information[r][np.ix_(used, used)]
             right[rows] = found.score[r][used]
+            if not _usable(whole, right):
+                # a motion that diverges says nothing about the parameters
+                whole, right = np.zeros_like(whole), np.zeros_like(right)
             record.append(name)
             start.append(max(a, 0.0))
             information.append(whole)
@@ -101,6 +104,12 @@ def blocks_of(
         pull,
         np.maximum(columns.record, 0),
     )
+
+
+def _usable(*arrays: np.ndarray) -> bool:
+    """Return whether products of the numbers in arrays neither overflow nor are NaN."""
+    most = np.cbrt(np.finfo(float).max)
+    return all(bool(np.all(np.abs(one) < most)) for one in arrays)
 
 
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
