@@ -110,22 +110,9 @@ def simulate(
     if not traced:
         check_arguments(system, settings, t_start, state, t1)
     if engine == "diffeqsolve":
-        if isinstance(system, SwitchedSystem):
-            raise ValueError(
-                'engine="diffeqsolve" does not support switching surfaces; use '
-                'engine="loop"'
-            )
-        if traced:
-            raise ValueError(
-                'engine="diffeqsolve" is driven from Python and cannot be traced by '
-                'jit, vmap or grad; use engine="loop" there'
-            )
-        check_gaps(system, settings, t_start, state)
-        budget = 1_000_000 if max_steps is None else max_steps
-        log, contact, code = simulate_segments(
-            system, settings, t_start, state, t1, budget, progress
+        parts, code = _by_diffeqsolve(
+            system, settings, t_start, state, t1, max_steps, progress, traced
         )
-        parts = _trim(_assemble(system, t_start, state, contact, log))
         return _trajectory(system, settings, t0, t1, parts, code)
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
@@ -148,6 +135,28 @@ def simulate(
         # the loop has found out, but does not say by how much
         check_gaps(system, settings, t_start, state)
     return _trajectory(system, settings, t0, t1, _trim(parts), code)
+
+
+def _by_diffeqsolve(
+    system, settings, t0, state, t1, max_steps, progress, traced
+) -> tuple[Parts, Any]:
+    """Return parts and result code of a run with one diffrax call per piece."""
+    if isinstance(system, SwitchedSystem):
+        raise ValueError(
+            'engine="diffeqsolve" does not support switching surfaces; use '
+            'engine="loop"'
+        )
+    if traced:
+        raise ValueError(
+            'engine="diffeqsolve" is driven from Python and cannot be traced by jit, '
+            'vmap or grad; use engine="loop" there'
+        )
+    check_gaps(system, settings, t0, state)
+    budget = 1_000_000 if max_steps is None else max_steps
+    log, contact, code = simulate_segments(
+        system, settings, t0, state, t1, budget, progress
+    )
+    return _trim(_assemble(system, t0, state, contact, log)), code
 
 
 def _trajectory(system, settings, t0, t1, parts: Parts, code) -> Trajectory:
