@@ -31,19 +31,21 @@ from .engine import (
 )
 
 
-# Steps of Newton's method on the initial state, and its relative tolerance
+# Maximum number of Gauss-Newton steps for the initial state, and the relative decrease
+# of the cost below which they end
 _NEWTON, _STILL = 20, 1e-12
-# Fraction of the information used to hold an unobserved state in place
+# Information, relative to that of the data, that keeps an unobserved component of the
+# initial state from moving
 _LEAST = 1e-12
-# Steps between two samples: initial and maximum number
+# Integration steps between two samples: initial and maximum number
 _FIRST_STEPS, _MOST_STEPS = 2, 64
 # Allowed change of the simulated motion when the steps are halved, in standard
 # deviations of the noise or relative to the motion
 _OF_NOISE, _OF_MOTION = 0.1, 1e-6
 # Change, relative to the motion, above which the largest number of steps is too small
 _TOO_FAR = 1e-2
-# Switching events that are located between two samples; if there are as many, there may
-# be more
+# Maximum number of switching events that are located between two samples; if this
+# number is reached, there may be more
 _EVENTS = 4
 # Relative difference allowed between sampling intervals
 _UNEVEN = 0.01
@@ -154,9 +156,10 @@ def free_run(
 class Prepared(eqx.Module):
     """A recording prepared for a free run.
 
-    `state` `(n,)` at the first sample, estimated from the first `samples`; times
-    `start` and `interval` (s); the input's `level` `(k,)`; `data` `(k, c)` and their
-    `noise` `(c,)`; the number of `steps` between two samples.
+    `state` `(n,)` at the first sample, estimated from the first `samples`; `start` and
+    `interval` (s): time of the first sample, and sampling interval; `level` `(k,)` of
+    the input; `data` `(k, c)` and their `noise` `(c,)`; the number of integration
+    `steps` between two samples.
     """
 
     state: Float[Array, " n"]
@@ -180,7 +183,7 @@ class Simulated(NamedTuple):
 
 
 def prepared(model: Model, recording: Recording | Segments, samples: int) -> Prepared:
-    """Return a recording with its initial state, and with steps that are short enough.
+    """Return a recording with its initial state and enough integration steps.
 
     **Raises:** see `free_run`.
     """
@@ -212,7 +215,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
     one = _started(model, one)
     found = simulated(model, one)
     while True:
-        # with too long steps, the estimate of the state may be far off as well
+        # if the steps are too long, the estimated initial state may also be far off
         finer = _started(model, dataclasses.replace(one, steps=2 * one.steps))
         again = simulated(model, finer)
         off = jnp.max(jnp.abs(again.channels - found.channels), axis=0)
@@ -232,7 +235,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
 
 @program
 def simulated(model: Model, one: Prepared) -> Simulated:
-    """Simulate the motion from the initial state, at each sample."""
+    """Simulate the motion from the initial state, and evaluate it at each sample."""
     step = one.interval / one.steps
     size = one.state.shape[0] - len(filtered_channels(model))
 
@@ -279,7 +282,7 @@ def simulated(model: Model, one: Prepared) -> Simulated:
 
 
 def _first_state(model: Model, data) -> Float[Array, " n"]:
-    """Return positions from the first samples, with all velocities zero."""
+    """Return a state with positions from the first samples and zero velocities."""
     state = jnp.zeros(state_size(model) + len(filtered_channels(model)))
     for k, sensor in enumerate(model.sensors.values()):
         seen = np.flatnonzero(np.isfinite(data[:, k]))
@@ -299,7 +302,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
         if not now < cost * (1 - _STILL):
             break
         cost = now
-        # rows scaled to equal units; an unobserved state does not move
+        # columns scaled to unit length; an unobserved component does not move
         scale = np.linalg.norm(rows, axis=0)
         scale = np.where(scale > 0, scale, 1.0)
         state = state - np.linalg.lstsq(rows / scale, missed, rcond=None)[0] / scale
@@ -328,7 +331,7 @@ def restarted(model: Model, one: Prepared) -> Prepared:
     """
     few = _first(one)
     missed, rows = _off(model, few, few.state)
-    # the derivatives at the fitted state are accurate enough; only their size changes
+    # the scales only improve the conditioning, so they are not differentiated
     scale = jnp.linalg.norm(jax.lax.stop_gradient(rows), axis=0)
     scale = jnp.where(scale > 0, scale, 1.0)
     rows = rows / scale[None]

@@ -6,7 +6,8 @@ from .caches import Cache, Latest
 from .programs import is_traced, program
 
 
-# Preparing a system may take as long as a short run; a run prepares it several times
+# Prepared systems are kept, because preparing a system may take as long as a short run,
+# and each run needs the prepared system several times
 _LATEST, _READY = Latest(), Cache(64)
 
 
@@ -20,7 +21,7 @@ def prepared(system: HybridSystem) -> HybridSystem:
     if is_traced(system):
         return _by_xla(system)
     key = structure_of(system), digest_of(system)
-    # made without a lock, because a user's function may itself run a simulation
+    # prepared without a lock, because a user's function may itself run a simulation
     ready = _READY.find(key) if key[0] is not None else None
     if ready is None:
         ready = _by_xla(system)

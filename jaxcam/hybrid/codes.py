@@ -85,7 +85,7 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
         "does not push it away. Choose a smaller friction coefficient, or model the "
         "contact as a compliant force in the vector field."
     )
-    """Friction makes a contact force ambiguous or impossible."""
+    """Because of friction, a contact force does not exist or is not unique."""
 
 
 _ITEMS = (

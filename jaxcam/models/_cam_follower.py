@@ -128,8 +128,8 @@ class CamFollower(AbstractCamDriven):
     def load_terms(self, lift, slope, curvature):
         """Return a, b and c of the contact torque `a w^2 + b w + c` (N m) at speed w.
 
-        Lift, slope and curvature are those of the profile, per radian of the cam
-        (thesis, eq. 4.10).
+        `lift`, `slope` and `curvature` are the lift of the profile and its first and
+        second derivatives with respect to the cam angle (thesis, eq. 4.10).
         """
         at_rest = jnp.stack([lift, jnp.zeros_like(lift)])
         spring = -self.inertia * self.vector_field(0.0, at_rest)[1]

@@ -80,7 +80,8 @@ class ValveTrain(AbstractCamDriven):
     def load_terms(self, lift, slope, curvature):
         """Return a, b and c of the contact force `a w^2 + b w + c` (N) at speed w.
 
-        Lift, slope and curvature are those of the profile, per radian of the cam.
+        `lift`, `slope` and `curvature` are the lift of the profile and its first and
+        second derivatives with respect to the cam angle.
         """
         return (
             self.mass * curvature,

@@ -156,7 +156,7 @@ class CarriedJob(DiagramJob):
 
 
 def each_value(section, where, values, starts, turns, keep, period_tolerance) -> Arrays:
-    """Compute all motions of some values at once."""
+    """Compute all motions at the given values at once."""
     points, count, n = starts.shape
     lanes = np.repeat(values, count, axis=0)
     samples, labels = settle(
@@ -175,8 +175,8 @@ def each_value(section, where, values, starts, turns, keep, period_tolerance) ->
 def one_after_the_other(
     section, where, values, starts, first, carried, turns, keep, room, period_tolerance
 ) -> Arrays:
-    """Compute the motions at some values in order; `first` marks those that start from
-    the given initial states.
+    """Compute the motions at the given values in order; `first` marks the values at
+    which the motions start from the given initial states.
 
     **Arguments:** `turns`, `keep`: one number for each value; `room`: capacity for
     samples, padded with NaN.

@@ -23,7 +23,7 @@ def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
 
     Args:
         system: A system with a `period`, two states and one constraint.
-        state: A state near its surface, shape `(2,)`.
+        state: A state near the constraint, shape `(2,)`.
 
     Returns:
         The admissible orbits, with impacts in the first period, ordered by the sum of

@@ -15,7 +15,7 @@ from ._words import quantity
 # A resonance is shown from a tenth of its frequency to ten times that, a relaxation for
 # five of its time constants
 _DECADE, _TIMES = 10.0, 5.0
-# Integration steps of a hysteresis between two successive points of its table
+# Integration steps of a hysteretic element between two successive points of its table
 _STEPS = 20
 
 
@@ -24,8 +24,8 @@ def hidden_table(found: Fit, hidden: Hidden, points: int):
 
     For a resonance, this is the magnitude of the force for a unit deflection against
     frequency (Hz). For a relaxation, it is the force against the time (s) after a unit
-    deflection. For a hysteresis, it is the force against the distance from a reversal
-    at the internal state `-limit` (full slip, unless the element stiffens).
+    deflection. For a hysteretic element, it is the force against the distance from a
+    reversal at the internal state `-limit` (full slip, unless the element stiffens).
 
     **Returns:** the argument, values and errors, each `(points,)`, and the element.
     """

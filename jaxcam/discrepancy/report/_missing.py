@@ -58,8 +58,8 @@ class MissingFunction:
         `"position"`, `"velocity"`, `"phase"`, `"time"` or `"speed"` (of approach); for
         a resonance `"frequency"` (Hz), where the value is the magnitude of the force
         for a unit deflection; for another force with an internal state `"memory"`, the
-        time (s) since a unit deflection, or, for a hysteresis, the distance from the
-        last reversal.
+        time (s) since a unit deflection, or, for a hysteretic force, the distance from
+        the last reversal.
     - `value`, `stderr`: value and standard error in `unit` at the points of the grid,
       `(n,)` or `(n, m)`.
     - `words`: a description. `records`: the recordings that were searched for it.

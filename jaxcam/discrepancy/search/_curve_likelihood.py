@@ -36,8 +36,8 @@ class CurveLikelihood(NamedTuple):
     """The likelihood of a function of a family about its fit, with all other free
     parameters eliminated.
 
-    Functions with coefficients c reduce the cost by `2 c @ slope - c @ information @
-    c`, both divided by the cost per sample. `gain`: that of the fitted function, and
+    A function with coefficients c reduces the cost, divided by the cost per sample, by
+    `2 c @ slope - c @ information @ c`. `gain`: this reduction for the fitted function;
     `freedom`: the price of its coefficients; `price`: that of a parameter.
     """
 
@@ -67,8 +67,8 @@ class CurveLikelihood(NamedTuple):
     def sines_of(
         self, primitive: Primitive, numbers: Float[np.ndarray, "n p"]
     ) -> Float[np.ndarray, "n k"]:
-        """Return the coefficients of the sums of sines nearest to forms with several
-        sets of parameters.
+        """Return the coefficients of the sums of sines that are closest to a form, for
+        several sets of its parameters.
         """
         family = self.family
         along = np.linspace(family.low, family.high, _GRID)
@@ -87,13 +87,13 @@ class CurveLikelihood(NamedTuple):
 
 @functools.lru_cache(maxsize=8)
 def _projection(family: Family, count: int) -> Float[np.ndarray, "k n"]:
-    """Return the matrix that maps values on the grid to the nearest coefficients."""
+    """Return the matrix that fits a sum of sines to values on the grid."""
     along = np.linspace(family.low, family.high, _GRID)
     return np.linalg.pinv(free_basis(family, along, count), rcond=1e-6)
 
 
 def promising(likelihood: CurveLikelihood, most: int) -> list[Start]:
-    """Return at most so many forms with the largest predicted gains."""
+    """Return the forms with the largest predicted gains, at most `most` of them."""
     ranked = []
     for primitive in likelihood.family.primitives:
         starts = likelihood.starts_of(primitive)

@@ -22,16 +22,16 @@ from ._sums_of_forms import SumSearch
 def formulated(
     fits: FreeFits, found: Missing, apart: Problem, small: float, progress
 ) -> tuple[Missing, list[Missing]]:
-    """Replace the functions of a fit by forms that have as much evidence.
+    """Replace the functions of a fit by forms that have about as much evidence.
 
-    **Arguments:** `apart`: the problem with disconnected pieces. `small`: an increase
-    of the cost above which a form is not fitted further.
+    **Arguments:** `apart`: the problem with disconnected pieces. `small`: the tolerated
+    increase in cost.
 
     **Returns:** the fit, and all fits with forms.
     """
     tried: list[Missing] = []
     for slot in [one.slot for one in found.functions]:
-        # a fit of another function may have renewed it
+        # the function may have changed while another one was replaced
         one = _in_slot(found, slot)
         if isinstance(one, Hidden) or not one.smooth:
             continue
@@ -68,8 +68,8 @@ class _Trials:
 
     @property
     def kept(self) -> Missing | None:
-        """Return the fit with the most evidence, if that is about as much as the
-        function has.
+        """Return the fit with the most evidence if the evidence is about as high as
+        that of the function, or higher.
         """
         best = min(self.sound, key=lambda trial: trial.score, default=self.found)
         allowed = self.found.score + self.fits.policy.form_loss
@@ -82,10 +82,10 @@ class _Trials:
         return any(trial.fit.cost < allowed for trial in self.sound)
 
     def run(self, waiting: list[Start]) -> None:
-        """Fit forms in turn, until the next cannot have more evidence.
+        """Fit forms in turn, until the next one is unlikely to have more evidence.
 
         A form with an exponent is followed by its special case for an exponent of one,
-        which has one parameter less.
+        which has one parameter fewer.
         """
         waiting, done, least = list(waiting), set(), -math.inf
         while waiting:
@@ -104,7 +104,7 @@ class _Trials:
                 continue
             self.sound.append(trial)
             if trial.score < self.found.score:
-                # only a form that promises as much may have more evidence
+                # only a form with a similar predicted gain may have more evidence
                 least = max(least, gain - self.fits.policy.leads)
             if form.special is not None:
                 names = _in_slot(trial, self.one.slot).coefficients[:-1]
@@ -137,8 +137,8 @@ def _sound(trial: Missing, one: Free) -> bool:
 def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     """Return whether the cost of a fit is that of the noise.
 
-    **Arguments:** `small`: a residual gain that is tolerated; a clearly smaller one
-    does not count.
+    **Arguments:** `small`: the tolerated residual; a fraction `Policy.enough` of it is
+    treated as noise.
     """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
@@ -155,8 +155,7 @@ def _fitted(
 ) -> Missing | None:
     """Fit a form in place of a function.
 
-    **Returns:** the fit, or `None` if the form does not even explain individual
-    pieces.
+    **Returns:** the fit, or `None` if the form explains much less than the function.
     """
     problem, numbers = found.problem, start.numbers
     size = Roughness(size=abs(float(numbers[0])))

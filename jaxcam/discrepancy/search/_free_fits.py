@@ -32,8 +32,7 @@ class Missing(NamedTuple):
     - `problem`: the problem with slots for the functions; that of `fit` contains their
       priors.
     - `decoys`: for each label, the predicted gain of a function of the same family that
-      acts in the reverse order of time, as a fraction of the gain of the function
-      itself.
+      is reversed in time, as a fraction of the gain of the function itself.
     """
 
     functions: tuple[Part, ...]

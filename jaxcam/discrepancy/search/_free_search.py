@@ -291,7 +291,7 @@ class FreeSearch:
     def _swapped(self, found: Missing) -> Missing:
         """Replace earlier functions by terms that explain more.
 
-        A function found far from the data may represent two effects.
+        A function found while the fit is far from the data may represent two effects.
         """
         for out in (*found.functions, *sorted(found.names)):
             rest, point = self.left_out.subset(found, out)

@@ -1,4 +1,4 @@
-"""Stop a fit that makes little progress far from the data, or is too slow.
+"""Stop a fit that is too slow, or that makes little progress while its cost is high.
 
 Without the right term, a fit may take very many small steps along a valley of the cost;
 with the right term, it needs a few large steps.

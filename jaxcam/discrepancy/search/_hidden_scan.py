@@ -30,11 +30,11 @@ from ._vibration_scan import scanned_frequencies
 _RATIOS = (0.02, 0.1)
 # Ratio of adjacent time constants of a relaxation
 _TIMES = 1.25
-# Limits of a hysteresis, as fractions of the range of positions, and its other
+# Limits of a hysteretic element, as fractions of the range of positions, and its other
 # parameters
 _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
-# The same for a stiffening hysteresis
+# The same for a stiffening hysteretic element
 _STIFFENING_LIMITS = tuple(np.geomspace(0.1, 10, 12).tolist())
 _STIFFENING_SHAPES = ((-0.3, 1.0), (-2.0, 1.0), (-0.3, 2.0), (-2.0, 2.0))
 # Maximum number of force values at nodes that are computed at once

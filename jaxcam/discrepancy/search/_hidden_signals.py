@@ -103,7 +103,7 @@ def resonance_signals(driven: Driven, frequency: float, ratio: float):
 
 
 def relaxation_signals(driven: Driven, time: float):
-    """Return output and free motion of `z' = v - z / time`, both `(r, n, 1)`."""
+    """Return the output and free motion of `z' = v - z / time`, both `(r, n, 1)`."""
     pole = complex(-1 / time)
     filtered, free = [], []
     for position, interval in zip(driven.position, driven.interval):
@@ -126,17 +126,18 @@ def _first_order(position, pole: complex, interval: float):
     return found
 
 
-# Initial state of a hysteresis, used to compute the effect of a change in it
+# Initial state of a hysteretic element, as a fraction of its scale, used to compute the
+# effect of a change in the initial state
 _BESIDE = 1e-3
-# Limit on the state of a stiffening hysteresis, in units of its scale: without a limit,
-# the state may become infinite at a finite deflection
+# Limit on the state of a stiffening hysteretic element, in units of its scale: without
+# a limit, the state may become infinite at a finite deflection
 _MOST = 30.0
 
 
 def hysteresis_signals(
     driven: Driven, limits: Any, betas: Any, powers: Any, loading: int = 1
 ) -> tuple[Float[np.ndarray, "k r n 1"], Float[np.ndarray, "k r n 1"]]:
-    """Compute Bouc-Wen hysteresis for several `(k,)` sets of parameters at once.
+    """Compute Bouc-Wen hysteresis for `k` sets of parameters at once.
 
     **Returns:** the internal state, starting from zero, and its derivative with respect
     to the initial state.
@@ -173,7 +174,7 @@ def hysteresis_signals(
 def at_times(
     driven: Driven, signals: Float[np.ndarray, "r n s"], time
 ) -> Float[np.ndarray, "r k l s"]:
-    """Interpolate signals linearly at some times `(r, k, l)`."""
+    """Interpolate signals linearly at the given times `(r, k, l)`."""
     found = []
     for signal, at, begin, interval in zip(
         signals, time, driven.begin, driven.interval

@@ -24,8 +24,8 @@ from ._slots import filled, Free, free_term, slots_of
 class Lead(NamedTuple):
     """A candidate function, element or term, with its predicted gain.
 
-    `decoy` is the gain of a function of the same family that acts in the reverse order
-    of time, as a fraction of the gain; `None` if it was not computed.
+    `decoy` is the gain of a function of the same family that is reversed in time, as a
+    fraction of the gain; `None` if it was not computed.
     """
 
     gain: float

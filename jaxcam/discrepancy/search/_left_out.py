@@ -28,7 +28,7 @@ class LeftOut:
         self.strengths = {t.name: [one.name for one in t.strengths()] for t in terms}
 
     def subset(self, found: Missing, out: Part | str) -> tuple[Subset, Point]:
-        """Return the subset without a function or a term, and a start for its fit."""
+        """Return the subset without a function or term, and a start for its fit."""
         slot = "" if isinstance(out, str) else out.slot
         functions = tuple(f for f in found.functions if f.slot != slot)
         names = found.names - {out} if isinstance(out, str) else found.names
@@ -43,7 +43,7 @@ class LeftOut:
         return Subset(self.problem, functions, names), point
 
     def predicted_loss(self, found: Missing, out: Part | str) -> float:
-        """Return the increase of the cost without a function or a term, according to
+        """Return the increase in cost if a function or a term is left out, according to
         the quadratic likelihood about the fit.
         """
         free, kept = self.fits.free(found), self.fits.free(self.subset(found, out)[0])
@@ -60,7 +60,8 @@ class LeftOut:
     def pruned(self, found: Missing, allowed: Callable[[Missing], float]) -> Missing:
         """Return the fit without the functions and terms that are not needed.
 
-        **Arguments:** the increase of the score that is `allowed` without one of them.
+        **Arguments:** `allowed(fit)`, the increase in the score below which a function
+        or term is not needed.
         """
         for one in (*found.functions, *sorted(found.names)):
             if len(found.functions) + len(found.names) < 2:

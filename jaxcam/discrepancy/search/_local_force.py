@@ -1,4 +1,5 @@
-"""Linearise the recordings about a force that is free at every node of every flight.
+"""Linearise the predictions of the recordings with respect to a force that is free at
+every node of every flight.
 
 To first order, every effect in flight is a sum of such forces. One linearisation
 therefore predicts the gains of any number of forces, without compiling a program for
@@ -61,12 +62,12 @@ class Response(NamedTuple):
     - `point`: the point of linearisation; `free`: names of the free parameters.
     - `pieces`: `LinearPieces` of each recording, with `n` columns for the state, `m`
         for the parameters and `l` for the force at the nodes.
-    - `place` `(r, m)`: index among the `g` free parameters of each parameter of a
-      recording.
+    - `place` `(r, m)`: for each parameter of a recording, its index among the `g` free
+      parameters.
     - `time` `(r, k, l)`: times of the nodes. `exists` `(r, k)`: false where padded.
     - `names`, `scale`, `prior`, `pull`, `owner` `(g,)`: names and scales of the free
-        parameters, the contributions of their tolerances to information and score, and
-        the recording to which they belong.
+        parameters, the contributions of their tolerances to the information and the
+        score, and the recording to which they belong.
     """
 
     point: Point
@@ -96,8 +97,8 @@ def stride_of(problem: Problem) -> int:
 def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Response:
     """Linearise about a point, with some parameters free and a force at every node.
 
-    The nodes are the times at which the steps of the flights evaluate their field, or
-    every `stride`-th of them.
+    The nodes are the times at which the integration steps evaluate the vector field, or
+    every `stride`-th of these times.
     """
     columns = free_columns(problem, free)
     stride = stride_of(problem)
@@ -135,13 +136,13 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
 def force_blocks(
     problem: Problem, response: Response, terms: Sequence[Term], decoy: bool = False
 ) -> Blocks:
-    """Return score and information of the free parameters and of terms that act in
-    flight.
+    """Return the score and the information of the free parameters and of terms that
+    act in flight.
 
     **Arguments:** terms that are not in the problem, are linear in their strengths, and
     act on the first coordinate; the rows of their strengths follow those of the free
-    parameters, in order. As a `decoy`, the terms act at the wrong times: in the
-    reverse order of the recording.
+    parameters, in order. As a `decoy`, the terms act at the wrong times: they
+    are reversed in time.
     """
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
@@ -179,7 +180,7 @@ def force_blocks(
 def _in_reverse(
     response: Response, forces: Float[np.ndarray, "r k l p"]
 ) -> Float[np.ndarray, "r k l p"]:
-    """Return the forces of each recording in the reverse order of time."""
+    """Return the forces of each recording, reversed in time."""
     found = forces.copy()
     for row, exists in enumerate(response.exists):
         rows = np.flatnonzero(exists)
@@ -190,7 +191,7 @@ def _in_reverse(
 def forces_at_nodes(
     problem: Problem, response: Response, terms: Sequence[Term]
 ) -> Float[np.ndarray, "r k l p"]:
-    """Return the acceleration per unit of each strength of some terms, at every
+    """Return the acceleration per unit of each strength of the given terms, at every
     node.
     """
     terms = tuple(terms)

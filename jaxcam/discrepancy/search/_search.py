@@ -54,9 +54,9 @@ class Search:
         return self._sound(bare)
 
     def _sound(self, bare: Trial) -> Trial:
-        """Return the best of the subsets whose fits are complete.
+        """Return the best of the subsets whose quadratic models are valid.
 
-        A candidate whose fit fails must not hide one whose fit succeeds.
+        A subset whose fit fails must not hide one whose fit succeeds.
         """
         sound = [one for one in self.trials.known.values() if self.trials.settled(one)]
         best = min(sound, key=_bic, default=bare)
@@ -65,8 +65,10 @@ class Search:
         return self._swapped(self._smallest(best))
 
     def _leads(self, before: Trial, best: Trial) -> bool:
-        """Return whether to continue the search; far from the data, only if the terms
-        help substantially.
+        """Return whether to continue the search.
+
+        If the fit is far from the data, the search continues only if the added terms
+        have reduced the cost substantially.
         """
         part = best.fit.cost / before.fit.cost
         return self.trials.settled(best) or part < self.policy.helped
@@ -87,8 +89,8 @@ class Search:
     def _promised(
         self, kept: Sequence[Trial], best: Trial
     ) -> dict[frozenset[str], tuple[float, Trial]]:
-        """Return the subsets with one more term than those kept: the predicted BIC, and
-        the subset that predicts it.
+        """Return the subsets with one term more than those kept, each with its
+        predicted BIC and the smaller subset from which the BIC is predicted.
         """
         promised: dict[frozenset[str], tuple[float, Trial]] = {}
         # scores at the best subset are most reliable
@@ -175,12 +177,12 @@ class Search:
                 change = change + extra * math.log(self.trials.problem.samples)
                 if change < worse:
                     found.append((change, (best.names - {out}) | {term.name}))
-        # the most promising ones; among equals, the first
+        # the most promising subsets; among equals, the first
         found.sort(key=lambda one: one[0])
         return [names for _, names in found[: self.policy.tried]]
 
     def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
-        """Return the predicted BIC with each further term, from its score."""
+        """Return the subsets with one further term, each with its predicted BIC."""
         blocks = self.trials.blocks(trial)
         information, score = blocks.total()
         free = blocks.rows(self.trials.parameters(trial.names))
@@ -209,9 +211,9 @@ class Search:
     def _least_of_vibrations(self, trial: Trial) -> float:
         """Return the predicted gain that a vibration must have to be fitted.
 
-        Far from the data, any missing physics has components at all frequencies, and
-        fits of a vibration take longest. A vibration must therefore explain most of the
-        residual.
+        If the fit is far from the data, any missing physics has components at all
+        frequencies, and fits of a vibration take longest. A vibration must therefore
+        explain most of the residual.
         """
         samples = self.trials.problem.samples
         if trial.fit.cost < self.policy.near * samples:

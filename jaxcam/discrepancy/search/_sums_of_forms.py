@@ -1,8 +1,8 @@
 """Find sums of parametric forms that resemble a free function.
 
-All pairs of forms are compared on a grid of their parameters, and extended by a third
-form. The most promising sums are refined. All this uses the quadratic likelihood of the
-function; nothing is integrated.
+All pairs of forms are compared on a grid of their parameters, and each pair is extended
+by a third form. The most promising sums are refined. These computations use the
+quadratic likelihood of the function, so no trajectory is integrated.
 """
 
 import itertools
@@ -17,18 +17,18 @@ from ..terms import MOST_PARTS, Primitive, sum_of
 from ._curve_likelihood import CurveLikelihood, Start
 
 
-# Squared correlation above which the data do not tell two forms apart
+# Squared correlation above which the data do not distinguish two forms
 _ALIKE = 0.95
 # Number of sums of each size that are refined, and maximum number of evaluations
 _REFINED, _EVALUATIONS = 8, 40
-# Increase of the gain for which a part is replaced by another
+# Minimum increase in gain for which a part is replaced by another
 _MORE = 0.1
 # Step of finite differences, relative to a significant change of a parameter
 _STEP = 0.02
 
 
 class _Sum(NamedTuple):
-    """A sum of forms with its parameters, and its `gain`, as in a `Start`."""
+    """A sum of forms, with its parameters and its `gain` (defined in `Start`)."""
 
     gain: float
     parts: tuple[Primitive, ...]
@@ -57,8 +57,8 @@ class _Sum(NamedTuple):
 
 
 def _best_of(sums: Iterable[_Sum]) -> list[_Sum]:
-    """Return the best of all sums of the same forms, those with the largest gain
-    first.
+    """Return the best sum for each combination of forms, in order of decreasing
+    gain.
     """
     ranked = sorted(sums, key=lambda one: one.gain)
     best = {tuple(sorted(part.name for part in one.parts)): one for one in ranked}
@@ -66,12 +66,12 @@ def _best_of(sums: Iterable[_Sum]) -> list[_Sum]:
 
 
 class _Grid(NamedTuple):
-    """Forms with all their starting values.
+    """Forms with all their starting values, one row for each.
 
-    - `rows`: by form, the rows that belong to it.
-    - `numbers`: by form, the parameters.
-    - `seen`: the coefficients in the units of the likelihood, normalised; `sizes`: the
-        sizes of the forms.
+    - `rows`: for each form, the rows that belong to it.
+    - `numbers`: for each form, the parameters of these rows.
+    - `seen`: for each row, the vector of the form (see `SumSearch`), scaled to length
+        one; `sizes`: the size parameters of the scaled forms.
     """
 
     forms: tuple[Primitive, ...]
@@ -85,7 +85,7 @@ class _Grid(NamedTuple):
         return next(k for k, rows in enumerate(self.rows) if row < rows.stop)
 
     def start_of(self, row: int, size: float) -> tuple[Primitive, np.ndarray]:
-        """Return the form of a row, and its parameters for a normalised size."""
+        """Return the form of a row, and its parameters for `size` times its vector."""
         kind = self.form_of(row)
         numbers = self.numbers[kind][row - self.rows[kind].start].copy()
         numbers[0] = size * self.sizes[row]
@@ -93,13 +93,14 @@ class _Grid(NamedTuple):
 
 
 class SumSearch:
-    """Searches for sums of forms that have the likelihood of a function.
+    """A search for sums of forms that are about as likely as a function.
 
-    In its units, a function is a vector, and the cost of the difference of two
-    functions is its square. `best` is the function with the largest likelihood.
+    A function is represented by a vector, scaled so that the cost of the function
+    exceeds the minimum by the squared distance from `best`, the vector of the most
+    likely function.
 
-    **Arguments:** the likelihood; and the share of its gain below which a part of a sum
-    does not count.
+    **Arguments:** the likelihood, and the minimum squared length of a part of a sum,
+    relative to that of `best`.
     """
 
     def __init__(self, likelihood: CurveLikelihood, least: float = 0.0):
@@ -112,7 +113,7 @@ class SumSearch:
         self.grid = self._grid()
 
     def promising(self, most: int) -> list[Start]:
-        """Return at most so many sums with the largest predicted gains."""
+        """Return the sums with the largest predicted gains, at most `most` of them."""
         guesses, found = _best_of(self._pairs()), []
         for count in range(2, MOST_PARTS + 1):
             if count > 2:
@@ -123,8 +124,8 @@ class SumSearch:
         return [Start(one.gain, one.form, one.numbers) for one in found[:most]]
 
     def _exchanged(self, sums: Sequence[_Sum]) -> list[_Sum]:
-        """Return the sums obtained by replacing parts of the best one in turn, as long
-        as its gain increases.
+        """Return the sums obtained from the best one by replacing one part at a time,
+        as long as the gain increases.
         """
         every: list[_Sum] = []
         best = max(sums, key=lambda one: one.gain, default=None)
@@ -159,7 +160,7 @@ class SumSearch:
         return _Grid(tuple(forms), rows, numbers, seen, sizes)
 
     def _pairs(self) -> Iterator[_Sum]:
-        """Yield the best pair of every two forms on the grid."""
+        """Yield the best sum of every two forms on the grid."""
         grid, price = self.grid, self.likelihood.price
         told = grid.seen @ self.best
         kinds = range(len(grid.forms))
@@ -185,9 +186,9 @@ class SumSearch:
                 yield _Sum(float(gains[i, j]) - count * price, parts, numbers)
 
     def _extended(self, one: _Sum) -> Iterator[_Sum]:
-        """Yield the sum with one more form of each kind.
+        """Yield the sum extended by each of the forms in turn.
 
-        The parameters of the sum may change to first order.
+        Changes in the parameters of the sum are taken into account to first order.
         """
         grid, price = self.grid, self.likelihood.price
         across = np.linalg.qr(self._slopes(one.form, one.numbers, one.scales))[0]
@@ -196,7 +197,7 @@ class SumSearch:
         inside = grid.seen @ across
         squares = 1 - np.sum(inside**2, axis=1)
         apart = np.where(squares > 1 - _ALIKE, squares, np.inf)
-        # what is left is already perpendicular to the changes of the sum
+        # the remainder is already perpendicular to the changes in the sum
         sizes = grid.seen @ left / apart
         gains = sizes**2 * squares
         so_far = self.best @ self.best - left @ left - one.form.count * price
@@ -222,8 +223,8 @@ class SumSearch:
         return (self._seen(form, steps) - self._seen(form, numbers)).T / _STEP
 
     def _refined(self, sums: Sequence[_Sum]) -> list[_Sum]:
-        """Return the best sums near given ones, without those whose parameters make no
-        sense or in which a part does not count.
+        """Optimise the parameters of sums. Return the sums whose parameters make sense
+        and whose parts all count.
         """
         found = []
         for one in sums:
@@ -245,8 +246,8 @@ class SumSearch:
         return found
 
     def _counts(self, one: _Sum) -> bool:
-        """Return whether every part of a sum is large enough, and the data tell it from
-        the others.
+        """Return whether every part of a sum is large enough and can be distinguished
+        from the others by the data.
         """
         each = [self._seen(*own) for own in zip(one.parts, one.own)]
         sizes = np.array([np.linalg.norm(own) for own in each])

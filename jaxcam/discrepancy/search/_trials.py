@@ -73,7 +73,7 @@ class Trials:
         return next(term for term in self.terms if term.name == name)
 
     def parameters(self, names: Iterable[str]) -> list[str]:
-        """Return the parameters of the rig and of some terms."""
+        """Return the parameters of the rig and of the given terms."""
         found = list(self.rig)
         for term in self.terms:
             if term.name in names:

@@ -95,11 +95,12 @@ class BilinearSpring(_WithEdge):
 
 
 class StopAbove(_WithEdge):
-    """An elastic stop above an edge, with losses.
+    """An elastic stop, with energy losses, that acts above an edge.
 
     At a depth `d = max(q - edge_a, 0)` the acceleration is `-d (ka + da v + la sign(v))
-    - ra sign(v)`: stiffness, viscous damping, a rate-independent loss as in rubber, and
-    dry friction, which sets in within a hundredth of the range.
+    - ra sign(v)`. The coefficients describe stiffness, viscous damping, a
+    rate-independent loss as in rubber, and dry friction. Beyond the edge, the friction
+    reaches its full value within about a hundredth of the range of positions.
     """
 
     name: ClassVar[str] = "stop_above"
@@ -121,9 +122,10 @@ class StopAbove(_WithEdge):
 
 
 class StopBelow(_WithEdge):
-    """An elastic stop below an edge, with the depth `d = max(edge_b - q, 0)`.
+    """An elastic stop, with energy losses, that acts below an edge.
 
-    See `StopAbove`; its parameters are `kd`, `dd`, `ld` and `rd`.
+    It is the mirror image of `StopAbove`, with the depth `d = max(edge_b - q, 0)` and
+    the coefficients `kd`, `dd`, `ld` and `rd`.
     """
 
     name: ClassVar[str] = "stop_below"
@@ -145,7 +147,7 @@ class StopBelow(_WithEdge):
 
 
 def _reaction(term: ScaledTerm, depth, velocity, stiffness, damping, loss, friction):
-    """Return the force of a stop at a depth and a velocity into it."""
+    """Return the force of a stop, given the depth and the velocity into the stop."""
     turned = jnp.tanh(velocity / term.scales.slip)
     touching = 1 - jnp.exp(-depth / (_BEGINS * term.scales.half))
     elastic = depth * (stiffness + damping * velocity + loss * turned)

@@ -80,7 +80,7 @@ def input_in_steps(
 
 
 def _integrals(time, level, at):
-    """Return the first and second integrals of held samples at some times."""
+    """Return the first and second integrals of held samples at the given times."""
     interval = np.diff(time)
     first = np.concatenate([[0.0], np.cumsum(level[:-1] * interval)])
     grown = first[:-1] * interval + level[:-1] * interval**2 / 2

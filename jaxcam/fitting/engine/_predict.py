@@ -209,7 +209,7 @@ def samples(
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]
     a, b = step * nodes.left_rate[:, None], step * nodes.right_rate[:, None]
-    # value, slope and curvature with respect to the place in the step
+    # value and first and second derivatives with respect to the position in the step
     jump = right - left
     second = 3 * jump - 2 * a - b
     third = a + b - 2 * jump

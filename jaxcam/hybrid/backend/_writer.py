@@ -88,7 +88,7 @@ class Writer:
         self.module, self.builder, self.width = module, builder, width
         # in branches and loops: the batch elements for which the result is used
         self.mask: Any = None
-        # where loaded values are in memory, by the identity of the values
+        # where loaded values are in memory, keyed by the `id` of each value
         self.places: dict[int, Place] = {}
         # number of values that lookups have stored on the stack
         self.stored = 0

@@ -149,7 +149,7 @@ class Attempt(NamedTuple):
     # has reached
     strikes: Any
     stuck: Any
-    # whether friction makes a contact force ambiguous at the end of the step
+    # whether friction causes a contact force not to be unique at the end of the step
     jams: Any
     # as in `LoopState`
     stale: tuple

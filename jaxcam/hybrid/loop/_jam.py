@@ -1,4 +1,4 @@
-"""End a run where friction makes a contact force ambiguous or impossible."""
+"""End a run where friction causes a contact force not to exist or not to be unique."""
 
 from typing import Any, NamedTuple
 

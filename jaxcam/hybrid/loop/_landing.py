@@ -35,7 +35,7 @@ class Landing(NamedTuple):
     hit: list
     impact: Impact
     chatter: Rest
-    # whether the chatter is completed from here, which constraints close then, and the
+    # whether the chatter is completed from here, which gaps close then, and the
     # acceleration of each
     begins: Any
     closing: list

@@ -1,8 +1,8 @@
 """Complete impacts that accumulate on several constraints at once.
 
 Such a sequence has no closed form: the order of the impacts may never repeat. The
-impacts are followed until the flights between them are negligible; then, all of these
-constraints close.
+impacts are followed until the flights between them are negligible; then, the gaps
+of all these constraints close.
 """
 
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ class JointRest(NamedTuple):
 
     possible: Any
     state: tuple
-    # which constraints close; multiplier of each constraint
+    # which gaps close; multiplier of each constraint
     closing: list
     multipliers: tuple
 

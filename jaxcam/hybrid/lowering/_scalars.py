@@ -1,8 +1,8 @@
 """Collect operations on scalars, and trace those on which a result depends.
 
-Each operation is stored once for the same operands. Only when its value is `forced` is
-it traced, which takes far longer than storing it: programs of arrays compute many
-elements that nothing depends on.
+An operation that is repeated with the same operands is stored only once. It is traced
+only when its value is `forced`, because tracing takes far longer than storing and array
+programs compute many elements on which nothing depends.
 """
 
 import functools
@@ -51,7 +51,7 @@ class Memory:
         self.made: dict[Any, Scalar] = {}
         # the scalars of elements of long arrays
         self.parts: dict[Any, Scalar] = {}
-        # the scalars of traced values, by the identity of these
+        # the scalars of traced values, keyed by the `id` of each value
         self.traced: dict[int, Scalar] = {}
 
     @no_type_check

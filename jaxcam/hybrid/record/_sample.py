@@ -101,14 +101,14 @@ def _points_of(steps: Steps, times, xp: ModuleType) -> _Point:
 
 @program
 def sample(system, settings: Settings, steps: Steps, times):
-    """Return the states at some times, `(times, n)`, computed by XLA."""
+    """Return the states at the given times, `(times, n)`, computed by XLA."""
     run = _run_of(system.prepared(), settings, steps, jnp)
     points = _points_of(steps, times, jnp)
     return jax.vmap(lambda point: _sampled(run, point, shared=False))(points)
 
 
 def sample_known(system, settings: Settings, steps: Steps, times) -> np.ndarray:
-    """Return the states at some times, `(times, n)`, of a run that is not traced."""
+    """Return the states at the given times, `(times, n)`, of an untraced run."""
     known = jax.tree.map(np.asarray, steps)
     if not times.size:
         return np.zeros((0, known.state.shape[1]))

@@ -1,4 +1,4 @@
-"""Find where friction makes a contact force ambiguous or impossible.
+"""Find where friction causes a contact force not to exist or not to be unique.
 
 While a body slips, the normal acceleration of a contact is a + c q: a is its value
 without the contact force q, and c, which is one without friction, changes in proportion

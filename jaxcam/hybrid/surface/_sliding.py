@@ -7,9 +7,9 @@ While a motion slides on surfaces, its field is
 where F_0 is the branch on the sides from which it came and F_k the branch beyond
 surface k, with weights b such that the switching functions of all these surfaces stay
 zero. On one surface, this is Filippov's convex combination. On several, it is exact if
-the effects of the sides add up, as those of several dry-friction forces do. (A. F.
-Filippov, Differential Equations with Discontinuous Righthand Sides, 1988, section 4; R.
-I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+the effects of the sides are additive, as those of several dry-friction forces are. (A.
+F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988, section 4;
+R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
 2004, chapter 4)
 
 The distance of a surface is its switching function on the side of the motion, plus its

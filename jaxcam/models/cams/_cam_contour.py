@@ -28,8 +28,8 @@ class CamContour(NamedTuple):
     radius_of_curvature: Float[Array, " angles"]
     """Radius of curvature (m), positive where the contour is convex."""
     pressure_angle: Float[Array, " angles"]
-    """Pressure angle (rad): the angle between the contact force and the motion of the
-    contact point.
+    """Pressure angle (rad): the angle between the contact force and the direction of
+    motion of the contact point.
     """
     arm: Float[Array, " angles"]
     """Lever arm of the contact force about the hinge (m); 1 for a translating
@@ -78,15 +78,16 @@ def flat_oscillating_contour(
     """Return the cam contour for a flat-faced follower hinged at the origin.
 
     The common normal intersects the line from the hinge to the cam axis at the point
-    where both bodies have the same velocity, so the contact point follows from lift and
-    slope.
+    where both bodies have the same velocity, so the contact point follows from the
+    angle of the follower and its derivative.
 
     Args:
         profile: Angle of the follower (rad) as a function of the cam angle (rad).
         cam_angles: Cam angles (rad), shape `(angles,)`.
         center: Position (x0, y0) of the cam axis relative to the hinge (m); not
             required for an [`jaxcam.models.EccentricCircle`][], which defines it.
-        half_height: Distance of the face from the hinge (m); as for `center`.
+        half_height: Distance of the face from the hinge (m); like `center`, not
+            required for an `EccentricCircle`.
 
     Returns:
         The contour about the cam axis.
@@ -237,7 +238,7 @@ def _roller(profile, center, direction, length, roller_radius, cam_angles):
 
 
 def _jet(profile, angle):
-    """Return lift, slope and curvature of any profile at one angle."""
+    """Return the lift of any profile and its first two derivatives at one angle."""
     derivatives = getattr(profile, "derivatives", None)
     if derivatives is not None:
         return tuple(derivatives(angle)[..., k] for k in range(3))
@@ -245,7 +246,7 @@ def _jet(profile, angle):
 
 
 def profile_jet(profile, angle):
-    """Return lift, slope and curvature of a profile by differentiation."""
+    """Return the lift of a profile and its first two derivatives by differentiation."""
     unit = (jnp.ones_like(angle),)
 
     def slope(a):

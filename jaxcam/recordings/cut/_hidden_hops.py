@@ -20,9 +20,9 @@ from .._rig import Quantity, Rig
 
 # Number of samples per turn
 _GRID = 720
-# Number of standard deviations of the tolerances allowed for
+# Margin for the tolerances, in standard deviations
 _SPREAD = 3.0
-# Largest advance (rad) of a release relative to the others
+# Largest angle (rad) by which a release may precede the others
 _EARLY = 0.1
 
 
@@ -65,8 +65,8 @@ def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
 
 
 def moved(rig: Rig):
-    """Return the rig with each quantity shifted by the standard deviation of its
-    tolerance.
+    """Yield copies of the rig, in each of which one quantity is shifted by the standard
+    deviation of its tolerance.
     """
     for field in dataclasses.fields(rig):
         one = getattr(rig, field.name)
@@ -93,14 +93,14 @@ def _along(system, times):
 
 
 def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Return the samples of a recording with a possible hidden flight."""
+    """Return the samples of a recording at which a hidden flight is possible."""
     phases = hop_phases(rig, drive.speed)
     return phases[np.round(drive.angle / (2 * np.pi) * _GRID).astype(int) % _GRID]
 
 
 def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
     """Return the samples that can be used to fit the surface if they are near it: those
-    without a possible hidden flight, or all samples if hidden flights are possible
+    at which no hidden flight is possible, or all samples if hidden flights are possible
     everywhere.
     """
     doubtful = may_hop(rig, drive)
@@ -110,9 +110,9 @@ def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
 def sure_contact(
     doubtful: Bool[np.ndarray, " k"], releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Return the samples at which observed contact is certain. A stretch with possible
-    hidden flights is certain if its release was observed, because the flight was then
-    observed, too.
+    """Return the samples at which observed contact is certain. In a stretch with
+    possible hidden flights, contact is certain if the release was observed, because the
+    flight was then observed, too.
 
     **Arguments:** the result of `may_hop`, and the samples of observed releases.
     """

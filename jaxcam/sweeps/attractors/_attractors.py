@@ -38,8 +38,8 @@ def find_attractors(
         fingerprint: Shape `(motions, means)`.
         cells: An iterable of pairs: indices of non-periodic motions, and the cells
             `(motions, keep)` that they visit.
-        starts: Initial states, `(motions, n)`; of several motions on an attractor, the
-            one with the smallest initial state represents it.
+        starts: Initial states, `(motions, n)`. Of several motions on an attractor, the
+            one whose initial state is first in lexicographic order represents it.
         same: Two orbits are equal if their fingerprints differ by less than this.
 
     Returns:
@@ -69,8 +69,8 @@ def _ordered(group, impacts, turns, fingerprint, starts):
     """Return numbers that do not depend on the order of motions."""
     found = group >= 0
     used = np.unique(group[found])
-    # the motion with the smallest start represents its group, whatever the order of
-    # motions
+    # the motion whose initial state is first in lexicographic order represents its
+    # group, whatever the order of the motions
     order = np.lexsort((*starts.T[::-1], group))
     order = order[found[order]]
     first = order[np.searchsorted(group[order], used)]
