@@ -106,8 +106,8 @@ class Policy:
     )
     explains: float = _decides(
         0.5,
-        "maximum fraction of the textbook model's cost that the best subset may leave "
-        "if no fit is near the data",
+        "far from the data, maximum fraction of a smaller model's cost that a model "
+        "may leave",
     )
     alike: float = _decides(
         1e-8,
