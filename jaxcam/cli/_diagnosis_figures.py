@@ -1,5 +1,6 @@
 """The figures of a report of `jaxcam diagnose`."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from ..plotting.labels import labelled
 
 
 _BINS = 36
+# longest line of a label (letters)
+_LABEL = 42
 
 
 def unit_along(variable: str, motion: str) -> str:
@@ -260,11 +263,20 @@ def _band(axis, one: Structure, color, label) -> None:
     axis.plot(one.grid, one.value, color=color, label=label)
 
 
+def _broken(name: str) -> str:
+    """Return a long name, such as a formula, in at most two lines."""
+    lines = textwrap.wrap(name, _LABEL, break_on_hyphens=False)
+    if len(lines) > 2:
+        lines = [lines[0], f"{lines[1]} …"]
+    return "\n".join(lines)
+
+
 def _ranking(plt, found: Diagnosis):
     ranked = found.alternatives[: found.policy.alternatives]
     pairs = [(one.name, one.delta_bic) for one in ranked] or [("none", 0.0)]
-    figure, axis = plt.subplots(figsize=(8, 0.35 * len(pairs) + 1.0))
-    names = [spelled(name).replace("+", " + ") for name, _ in pairs]
+    names = [_broken(spelled(name)) for name, _ in pairs]
+    rows = len(pairs) + sum(name.count("\n") for name in names) / 2
+    figure, axis = plt.subplots(figsize=(8, 0.35 * rows + 1.0), layout="constrained")
     # dots, not bars: a logarithmic axis has no zero for bars to start from
     for row, (_, delta) in enumerate(pairs):
         axis.plot(max(delta, 0.1), row, "o", color=FLIGHT)

@@ -118,7 +118,7 @@ def _alternatives(found: Diagnosis) -> list[str]:
         return []
     rows = [
         (
-            spelled(one.name).replace("+", " + "),
+            spelled(one.name),
             f"{one.delta_bic:+.3g}",
             one.reason,
         )

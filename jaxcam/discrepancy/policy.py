@@ -314,7 +314,7 @@ class Policy:
     visited: float = _shows(
         0.1, "minimum data density, relative to a uniform density, to show a function"
     )
-    shape_points: int = _shows(96, "number of points on the curve of a function")
+    shape_points: int = _shows(144, "number of points on the curve of a function")
     several: int = _shows(6, "maximum number of recordings whose values are listed")
     alternatives: int = _shows(8, "maximum number of alternatives listed")
 

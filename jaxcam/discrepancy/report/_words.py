@@ -1,11 +1,17 @@
 """Format numbers for the sentences of a verdict."""
 
+import re
+
+
 _PROPER = ("coulomb", "stribeck")
 
 
 def spelled(name: str) -> str:
-    """Return the name of a term as words, with capitals in the names of people."""
-    words = str(name).replace("_", " ")
+    """Return the name of one or several terms as words, with capitals in the names of
+    people.
+    """
+    # a plus sign also occurs in the formulas and numbers of a name
+    words = re.sub(r"(?<=[a-z])\+(?=[a-z])", " + ", str(name)).replace("_", " ")
     for one in _PROPER:
         words = words.replace(one, one.capitalize())
     return words
