@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxcam.cli import write_report
-from jaxcam.cli._diagnosis_figures import _shapes, draw, unit_along
+from jaxcam.cli._diagnosis_figures import _broken, _shapes, draw, unit_along
 from jaxcam.cli._diagnosis_page import diagnosis_page
 from jaxcam.cli._output import to_text
 from jaxcam.discrepancy import Diagnosis, Verdict
@@ -18,6 +18,7 @@ from jaxcam.discrepancy.report import (
     Effect,
     MissingFunction,
     Reason,
+    spelled,
 )
 from jaxcam.discrepancy.terms import shapes, Value, Variable
 from jaxcam.fitting import Residuals
@@ -172,3 +173,18 @@ def test_a_report_is_written_from_python(tmp_path, monkeypatch, unchecked_types)
     page = write_report("a diagnosis", str(tmp_path / "report"))  # pyright: ignore
     assert page == tmp_path / "report" / "index.html"
     assert written == [(tmp_path / "report", "a diagnosis", ())]
+
+
+def test_names_with_formulas_are_spelled_as_they_are():
+    """Terms are joined by a plus sign; those in formulas and numbers stay."""
+    assert spelled("coulomb_friction+sensor_lag") == "Coulomb friction + sensor lag"
+    assert (
+        spelled("force 1e+05*max(x - 2, 0) + 3*x") == "force 1e+05*max(x - 2, 0) + 3*x"
+    )
+
+
+def test_a_long_label_has_two_lines():
+    words = "force 0.17*cos(2*phase - 0.5) + 0.01*cos(phase - 2.2) + 0.08*cos(3*phase)"
+    first, second = _broken(words).splitlines()
+    assert words.startswith(first) and second.endswith(" …")
+    assert _broken("sensor lag") == "sensor lag"
