@@ -184,7 +184,8 @@ def test_names_with_formulas_are_spelled_as_they_are():
 
 
 def test_a_long_label_has_two_lines():
-    words = "force 0.17*cos(2*phase - 0.5) + 0.01*cos(phase - 2.2) + 0.08*cos(3*phase)"
+    waves = [f"0.{k}*cos({k}*phase - 0.5)" for k in range(1, 5)]
+    words = f"force {' + '.join(waves)}"
     first, second = _broken(words).splitlines()
     assert words.startswith(first) and second.endswith(" …")
     assert _broken("sensor lag") == "sensor lag"
