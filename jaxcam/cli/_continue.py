@@ -143,11 +143,8 @@ def _columns(names: Sequence[str]) -> dict[str, Callable[[Any], float | None]]:
         return value
 
     def largest(point):
-        return (
-            float(max(abs(m) for m in point.multipliers))
-            if len(point.multipliers)
-            else None
-        )
+        sizes = [float(abs(m)) for m in point.multipliers]
+        return max(sizes, default=None)
 
     found = {name: component(k) for k, name in enumerate(names[:3])}
     return found | {"largest multiplier": largest}

@@ -86,7 +86,7 @@ def fit(
     runs, nominal = read(case, rig, files, system)
     output = Output(json_file, out)
     with progress("finding impacts and contacts") as report:
-        found = fitted(runs, nominal, bootstrap, iterations or 60, report)
+        found = fitted(runs, nominal, bootstrap, iterations, report)
         figures = []
         if out is not None:
             report("drawing", None)

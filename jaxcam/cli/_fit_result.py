@@ -95,13 +95,13 @@ def fitted(
     runs: Iterable[Recording],
     nominal: Rig | fitting.Setup,
     bootstrap: int,
-    iterations: int,
+    iterations: int | None,
     report,
 ) -> Result:
     """Segment the recordings and fit the parameters of the rig.
 
     **Arguments:** `bootstrap`: number of Bayesian bootstrap replicates; 0 omits them.
-    `iterations`: maximum number of iterations of the fit.
+    `iterations`: maximum number of iterations of the fit; `None`: that of `fit`.
 
     Raises:
         ValueError: No parameter of the rig has a tolerance.
@@ -127,9 +127,10 @@ def fitted(
     problem = fitting.Problem.build(model, segments, parameters)
     before = fitting.fit(problem, free=())
     seen = fitting.identify(problem, at=before)
+    limit: dict[str, Any] = {} if iterations is None else {"iterations": iterations}
     after = fitting.fit(
         problem,
-        iterations=iterations,
+        **limit,
         progress=lambda k, cost: report(f"fitting, step {k}", None),
     )
     if isinstance(nominal, fitting.Setup):

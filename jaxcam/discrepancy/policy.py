@@ -79,7 +79,7 @@ class Policy:
     form_loss: float = _decides(10.0, "largest loss in BIC of a formula that is kept")
     tie: float = _decides(
         10.0,
-        "difference in BIC up to which another subset is reported as equally good (a "
+        "difference in BIC up to which two explanations count as equally good (a "
         "larger difference is very strong evidence: Kass and Raftery 1995)",
     )
     elsewhere: float = _decides(

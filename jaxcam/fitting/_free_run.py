@@ -223,14 +223,14 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
         if bool(jnp.all(off <= jnp.maximum(_OF_NOISE * one.noise, _OF_MOTION * size))):
             return one
         one, found = finer, again
-        if one.steps < _MOST_STEPS:
-            continue
-        if bool(jnp.any(off > jnp.maximum(one.noise, _TOO_FAR * size))):
-            raise ValueError(
-                f"{run.name}: {_MOST_STEPS} integration steps between two samples are "
-                f"too few; give a recording with shorter sampling intervals."
-            )
-        return one
+        if one.steps >= _MOST_STEPS:
+            break
+    if bool(jnp.any(off > jnp.maximum(one.noise, _TOO_FAR * size))):
+        raise ValueError(
+            f"{run.name}: {_MOST_STEPS} integration steps between two samples are too "
+            f"few; give a recording with shorter sampling intervals."
+        )
+    return one
 
 
 @program

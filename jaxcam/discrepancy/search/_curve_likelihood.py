@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from ..terms import Family, free_basis, Place, Primitive
 from ._free_fits import FreeFits, heat_of, Missing, Subset
-from ._roughness import beside
+from ._roughness import beside, occam_of
 from ._slots import Free
 
 
@@ -59,10 +59,8 @@ class CurveLikelihood(NamedTuple):
         value = np.asarray(found.fit.point.values)[0, columns]
         slope = inside @ value + pull
         gain = float(2 * value @ slope - value @ inside @ value)
-        spread = np.outer(one.spread, one.spread)
-        freedom = np.sum(np.log1p(np.maximum(np.linalg.eigvalsh(inside * spread), 0)))
-        price = math.log(found.problem.samples)
-        return cls(one.family, inside, slope, gain, price, float(freedom))
+        price, freedom = math.log(found.problem.samples), occam_of(inside, one.spread)
+        return cls(one.family, inside, slope, gain, price, freedom)
 
     def sines_of(
         self, primitive: Primitive, numbers: Float[np.ndarray, "n p"]

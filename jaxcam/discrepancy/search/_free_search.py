@@ -8,14 +8,12 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
 from scipy.stats import chi2
 
 from ...fitting import Problem
 from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
-from ._blocks import blocks_of, values_of
 from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
 from ._free_fits import FreeFits, heat_of, Missing, Subset
@@ -29,7 +27,6 @@ from ._left_out import LeftOut
 from ._recentre import recentred
 from ._slots import (
     emptied,
-    filled,
     Free,
     Part,
     roomy,
@@ -313,28 +310,18 @@ class FreeSearch:
         This uses the quadratic likelihood about the fit.
         """
         names = [t.name for t in self.terms if t.name not in found.names]
-        problem = filled(self.problem, found.functions)
-        free = self.fits.free(found)
-        kept = self.fits.free(self.left_out.subset(found, out)[0])
         strengths = {t: [s.name for s in self._term(t).strengths()] for t in names}
         every = [name for own in strengths.values() for name in own]
-        blocks = blocks_of(problem, found.fit.point, names=[*free, *every])
-        information, score = blocks.total()
-        step = np.zeros(len(blocks.names))
-        gone = blocks.rows(set(free) - set(kept))
-        step[gone] = -values_of(found.fit, blocks)[gone]
-        worse = step @ information @ step - 2 * step @ score
-        moved = score - information @ step
-        rows = blocks.rows(kept)
-        alike = self.policy.alike
+        left_out = self.left_out.quadratic(found, out, every)
+        quadratic = left_out.information, left_out.score, left_out.kept
         gains = {
-            t: added_gain(information, moved, rows, blocks.rows(own), alike)
+            t: added_gain(*quadratic, left_out.blocks.rows(own), self.policy.alike)
             for t, own in strengths.items()
         }
         if not gains:
             return None
         name = max(gains, key=lambda one: gains[one])
-        left = worse - gain(information, moved, rows) - gains[name]
+        left = left_out.worse - gain(*quadratic) - gains[name]
         allowed = self.policy.leads * heat_of(found.fit)
         return name if left < allowed + self._small(found) else None
 

@@ -1,6 +1,7 @@
 """Fits without one of the functions or terms that were found."""
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,10 +9,23 @@ from ...fitting import Problem
 from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Term
-from ._blocks import blocks_of, values_of
+from ._blocks import Blocks, blocks_of, values_of
 from ._free_fits import FreeFits, Missing, Subset
 from ._gains import gain
 from ._slots import emptied, filled, Part
+
+
+class Without(NamedTuple):
+    """The quadratic likelihood without a function or term: the increase in cost if
+    nothing else changes (`worse`), information and score there, and the rows of the
+    parameters that are kept.
+    """
+
+    worse: float
+    blocks: Blocks
+    information: np.ndarray
+    score: np.ndarray
+    kept: np.ndarray
 
 
 class LeftOut:
@@ -46,16 +60,27 @@ class LeftOut:
         """Return the increase in cost if a function or a term is left out, according to
         the quadratic likelihood about the fit.
         """
+        without = self.quadratic(found, out)
+        return without.worse - gain(without.information, without.score, without.kept)
+
+    def quadratic(
+        self, found: Missing, out: Part | str, more: Sequence[str] = ()
+    ) -> Without:
+        """Return the quadratic likelihood about a fit if a function or a term is left
+        out.
+
+        **Arguments:** names of `more` parameters, which are zero in the fit.
+        """
         free, kept = self.fits.free(found), self.fits.free(self.subset(found, out)[0])
         problem = filled(found.problem, found.functions)
-        blocks = blocks_of(problem, found.fit.point, names=free)
+        blocks = blocks_of(problem, found.fit.point, names=[*free, *more])
         information, score = blocks.total()
         step = np.zeros(len(blocks.names))
         gone = blocks.rows(set(free) - set(kept))
         step[gone] = -values_of(found.fit, blocks)[gone]
-        worse = step @ information @ step - 2 * step @ score
+        worse = float(step @ information @ step - 2 * step @ score)
         moved = score - information @ step
-        return worse - gain(information, moved, blocks.rows(kept))
+        return Without(worse, blocks, information, moved, blocks.rows(kept))
 
     def pruned(self, found: Missing, allowed: Callable[[Missing], float]) -> Missing:
         """Return the fit without the functions and terms that are not needed.

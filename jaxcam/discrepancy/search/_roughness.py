@@ -67,6 +67,13 @@ def occam(
     A and the prior standard deviations S of its coefficients.
     """
     inside, _ = beside(information, np.zeros(len(information)), free, own, alike)
+    return occam_of(inside, spread)
+
+
+def occam_of(
+    inside: Float[np.ndarray, "k k"], spread: Float[np.ndarray, " k"]
+) -> float:
+    """Return the Occam factor for the information on the coefficients alone."""
     values = np.linalg.eigvalsh(inside * np.outer(spread, spread))
     return float(np.sum(np.log1p(np.maximum(values, 0.0))))
 
