@@ -1,5 +1,6 @@
 """Whether an element with an internal state is tried, from its predicted gain."""
 
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -13,7 +14,14 @@ from jaxcam.fitting import Problem
 _LEAST = 24.0
 # what the predictions below do not use
 _PROBLEM = object.__new__(Problem)
-_FIT = Missing((), frozenset(), cast(Any, None), 0.0, _PROBLEM)
+
+
+def _fit_of(cost):
+    fit = SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=1000))
+    return Missing((), frozenset(), cast(Any, fit), 0.0, _PROBLEM)
+
+
+_FIT = _fit_of(1500.0)
 
 
 class _Predicted(ElementNeed):
@@ -49,10 +57,18 @@ def test_an_element_is_compared_with_the_functions(
 
 
 @pytest.mark.parametrize(("after", "needed"), [(20.0, False), (30.0, True)])
-def test_an_element_may_explain_what_functions_leave(after, needed):
+def test_an_element_may_explain_what_functions_leave(after, needed, unchecked_types):
     need = _Predicted(10.0, after)
     need.compare(_PROBLEM, _FIT, [1000.0], _LEAST)
     assert need.remains(_PROBLEM, _FIT, _LEAST) == needed
+
+
+@pytest.mark.parametrize(("after", "needed"), [(480.0, False), (500.0, True)])
+def test_far_from_the_data_an_element_must_explain_most(after, needed, unchecked_types):
+    """Half of the 980 in units of the cost per sample, 50."""
+    need = _Predicted(10.0, after)
+    need.compare(_PROBLEM, _FIT, [1000.0], _LEAST)
+    assert need.remains(_PROBLEM, _fit_of(50_000.0), _LEAST) == needed
 
 
 def test_an_element_that_is_no_candidate_promises_nothing():

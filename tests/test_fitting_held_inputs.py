@@ -12,7 +12,7 @@ from jaxcam.recordings import Recording, segment
 
 
 _INTERVAL, _NOISE, _GAIN = 1e-3, 1e-7, 3.0
-_COUNT = 1201
+_COUNT = 1190
 
 
 class Cart(HybridSystem):

@@ -1,8 +1,10 @@
 """Diagnose recordings: the verdict is "effect", "none" or "unknown"."""
 
+import dataclasses
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
@@ -10,18 +12,22 @@ from ..recordings import Recording, Rig, Segments
 from ._elsewhere import falls_short, sought_elsewhere
 from ._mappings import make_room
 from ._set_aside import odd_record, set_aside
-from .evidence import choose, ripple_of
+from .evidence import Choice, choose, ripple_of, whole_flights
 from .policy import Policy
 from .report import Diagnosis, diagnosis_of
 from .search import (
     Candidates,
+    far_from_data,
     KeptTrials,
     Question,
     Report,
     rig_question,
+    Search,
     setup_question,
     system_question,
+    Trial,
     Trials,
+    with_model_error,
 )
 from .terms import Location
 
@@ -167,10 +173,57 @@ def _answered(
         ripple = ripple_of(
             question.drives, question.drive_noise, question.drive_channel, policy
         )
+    trials, rough = _trials(question, report, keep, policy), None
+    bare = trials.attempt(frozenset(), None, policy.iterations)
+    if bare is not None and far_from_data(bare.fit, policy):
+        rough = _roughly(question, bare, seed, report, keep, policy)
+        if not rough.choice.explained(policy):
+            return diagnosis_of(case, *rough, ripple)
+        # the physics was found, so that the stated noise can be used
+        trials.attempt(rough.choice.best.names, rough.choice.best, policy.iterations)
+    best = Search(trials).run()
+    if rough is not None and rough.choice.missing is None:
+        if far_from_data(best.fit, policy):
+            return diagnosis_of(case, *rough, ripple)
+    choice = choose(question, trials, best, seed)
+    return diagnosis_of(case, question, trials, choice, ripple)
+
+
+class _Roughly(NamedTuple):
+    """A choice that allows for errors of the model."""
+
+    question: Question
+    trials: Trials
+    choice: Choice
+
+
+def _roughly(
+    question: Question,
+    bare: Trial,
+    seed: int,
+    report: Report,
+    keep: Path | None,
+    policy: Policy,
+) -> _Roughly:
+    """Choose with joints and noise that allow for errors of the model.
+
+    **Arguments:** `bare`: the fit of the textbook model to complete flights.
+    """
+    report("allowing for model errors", None)
+    folder = None if keep is None else keep / "with_model_error"
+    question = with_model_error(question, policy)
+    trials = _trials(question, report, folder, policy)
+    choice = choose(question, trials, Search(trials).run(), seed)
+    if not choice.explained(policy):
+        report("fitting complete flights", None)
+        whole = whole_flights(bare.fit, choice.fit, policy)
+        choice = dataclasses.replace(choice, whole=whole)
+    return _Roughly(question, trials, choice)
+
+
+def _trials(
+    question: Question, report: Report, keep: Path | None, policy: Policy
+) -> Trials:
     kept = None if keep is None else KeptTrials(keep, question.problem, policy)
-    trials = Trials(
-        question.problem, question.rig, question.terms, policy, report, kept
-    )
-    choice = choose(question, trials, seed)
-    found = diagnosis_of(case, question, trials, choice, ripple)
-    return found
+    problem, rig, terms = question.problem, question.rig, question.terms
+    return Trials(problem, rig, terms, policy, report, kept)

@@ -6,39 +6,13 @@ error rate per term and the detection limit are derived from the data and the se
 """
 
 import dataclasses
-import enum
-import functools
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from scipy.stats import norm
 
-
-class Group(enum.StrEnum):
-    """The part of a diagnosis that a setting of a policy affects."""
-
-    VERDICT = "verdict"
-    BUDGET = "budget"
-    REPORT = "report"
-
-
-def _number(group: Group, default: Any, says: str) -> Any:
-    return dataclasses.field(default=default, metadata={"group": group, "says": says})
-
-
-_decides = functools.partial(_number, Group.VERDICT)
-_bounds = functools.partial(_number, Group.BUDGET)
-_shows = functools.partial(_number, Group.REPORT)
-
-
-class Setting(NamedTuple):
-    """One setting of a policy: its name, value, group and meaning."""
-
-    name: str
-    value: Any
-    group: Group
-    says: str
+from ._settings import bounds, decides, Group as Group, Setting, shows
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -60,263 +34,274 @@ class Policy:
     """
 
     # settings that determine the verdict
-    false_alarms: float = _decides(
+    false_alarms: float = decides(
         0.01,
         "probability that any term is named although nothing is missing; divided among "
         "the terms and the frequencies of a scan (Bonferroni)",
     )
-    sure: float = _decides(
+    sure: float = decides(
         0.9,
         "fraction of the bootstrap samples that must retain a named term, and "
         "probability that an effect at its detection limit is named",
     )
-    most_terms: int = _decides(3, "maximum number of named terms")
-    form_error: float = _decides(
+    most_terms: int = decides(3, "maximum number of named terms")
+    form_error: float = decides(
         0.15,
         "maximum relative error of the functional form of a named term; its square is "
         "the fraction of the explained cost that may remain",
     )
-    form_loss: float = _decides(10.0, "largest loss in BIC of a formula that is kept")
-    tie: float = _decides(
+    form_loss: float = decides(10.0, "largest loss in BIC of a formula that is kept")
+    tie: float = decides(
         10.0,
         "difference in BIC up to which two explanations count as equally good (a "
         "larger difference is very strong evidence: Kass and Raftery 1995)",
     )
-    elsewhere: float = _decides(
+    elsewhere: float = decides(
         0.5,
         "another location is chosen if it leaves less than this fraction of a residual",
     )
-    corner_share: float = _decides(
+    corner_share: float = decides(
         3e-4,
         "maximum fraction of the explained cost that the smoothing of dry friction may "
         "cause; a term that explains less is not named together with a friction term",
     )
-    differs: float = _decides(
+    differs: float = decides(
         0.5,
         "minimum fraction of the misfit that separate parameter values for each "
         "recording must explain",
     )
-    as_much: float = _decides(
+    as_much: float = decides(
         0.9,
         "minimum gain of a function common to all recordings, relative to that of "
         "separate parameter values",
     )
-    near: float = _decides(
+    near: float = decides(
         4.0, "cost per sample below which a fit counts as near the data"
     )
-    explains: float = _decides(
+    explains: float = decides(
         0.5,
         "far from the data, maximum fraction of a smaller model's cost that a model "
         "may leave",
     )
-    alike: float = _decides(
+    alike: float = decides(
         1e-8,
         "minimum fraction of the information on a parameter that must remain when the "
         "other parameters are free",
     )
-    untold: float = _decides(
+    untold: float = decides(
         1e-3,
         "minimum fraction of the information on a term that one half of the recordings "
         "must contain to estimate the term",
     )
-    stretches: int = _decides(4, "maximum number of bootstrap blocks per recording")
-    stretch_pieces: int = _decides(
+    stretches: int = decides(4, "maximum number of bootstrap blocks per recording")
+    stretch_pieces: int = decides(
         8, "minimum number of flight pieces per bootstrap or held-out block"
     )
-    folds: int = _decides(3, "number of parts of the data in the cross-validation")
-    fewest_periods: float = _decides(
+    folds: int = decides(3, "number of parts of the data in the cross-validation")
+    fewest_periods: float = decides(
         4.0, "minimum number of periods of a vibration in the longest recording"
     )
-    period_samples: float = _decides(20.0, "minimum samples per period of a vibration")
-    period_steps: float = _decides(
+    period_samples: float = decides(20.0, "minimum samples per period of a vibration")
+    period_steps: float = decides(
         2.5, "minimum integration steps per period of a vibration"
     )
-    residual_lags: int = _decides(
+    residual_lags: int = decides(
         20, "number of lags (samples) in the autocorrelation test of the residuals"
     )
-    residual_stretches: int = _decides(
+    residual_stretches: int = decides(
         4, "number of sections per recording in that test; the worst section is ignored"
     )
-    velocity_tail: float = _decides(
+    velocity_tail: float = decides(
         0.005, "fraction of velocities beyond each end of a velocity function's range"
     )
-    drive_wander: float = _decides(
+    drive_wander: float = decides(
         0.75,
         "multiple of the rotation frequency below which speed changes count as drift",
     )
-    drive_degree: int = _decides(
+    drive_degree: int = decides(
         5, "degree of the polynomial for speed drift near the ends of a recording"
     )
-    drive_orders: tuple[float, ...] = _decides(
+    drive_orders: tuple[float, ...] = decides(
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),
         "non-harmonic multiples of the rotation frequency at which leakage is measured",
     )
-    odd: float = _decides(
+    odd: float = decides(
         10.0,
         "a recording is excluded if its cost per sample is at least this many times "
         "that of any other recording",
     )
-    records_apart: int = _decides(
+    records_apart: int = decides(
         4, "minimum number of recordings for one to be excluded"
     )
-    noisier: float = _decides(
+    noisier: float = decides(
         1.2, "ratio of measured to stated noise above which the measured noise is used"
     )
 
+    model_error: float = decides(
+        100.0,
+        "rms residual of the textbook model, in units of the noise, above which model "
+        "errors are allowed for",
+    )
+    resolved: float = decides(
+        0.03,
+        "in that case, the noise as a fraction of the residual of the textbook model "
+        "on single pieces of flight",
+    )
+
     # settings that limit the search
-    quick_iterations: int = _bounds(
+    quick_iterations: int = bounds(
         15, "maximum iterations in the first fit of a subset"
     )
-    iterations: int = _bounds(60, "maximum iterations in the fit of a leading subset")
-    heldout_iterations: int = _bounds(
+    iterations: int = bounds(60, "maximum iterations in the fit of a leading subset")
+    heldout_iterations: int = bounds(
         15, "maximum iterations in a fit to part of the recordings"
     )
-    state_iterations: int = _bounds(
+    state_iterations: int = bounds(
         12, "maximum Newton steps when only states are fitted"
     )
-    state_gain: float = _bounds(
+    state_gain: float = bounds(
         1e-3, "reduction of the cost below which these Newton steps end"
     )
-    kept: int = _bounds(3, "number of subsets of each size that are extended")
-    tried: int = _bounds(6, "number of subsets fitted at each size above one")
-    leads: float = _bounds(
+    kept: int = bounds(3, "number of subsets of each size that are extended")
+    tried: int = bounds(6, "number of subsets fitted at each size above one")
+    leads: float = bounds(
         50.0, "difference in BIC up to which a subset or a form is followed further"
     )
-    helped: float = _bounds(
+    helped: float = bounds(
         0.7, "the search goes on if a term reduces the cost to less than this fraction"
     )
-    clear: float = _bounds(
+    clear: float = bounds(
         10.0,
         "multiple of the required gain above which a loss of fit need not be accurate",
     )
-    astray: float = _bounds(
+    astray: float = bounds(
         3.0,
         "parameter shift, in prior standard deviations, beyond which a fit restarts",
     )
-    hopeless: float = _bounds(
+    hopeless: float = bounds(
         2.0, "multiple of the smallest cost above which a fit is not refined further"
     )
-    explained: float = _bounds(
+    explained: float = bounds(
         1.2, "cost per sample below which a fit is never stopped early"
     )
-    crawl_steps: int = _bounds(
+    crawl_steps: int = bounds(
         2, "number of final steps used to detect slow convergence"
     )
-    crawl_attempts: int = _bounds(
+    crawl_attempts: int = bounds(
         4, "minimum number of step attempts during these steps"
     )
-    crawl_gain: float = _bounds(
+    crawl_gain: float = bounds(
         0.01, "relative reduction of the cost below which these steps count as slow"
     )
-    late: int = _bounds(
+    late: int = bounds(
         8, "step attempts after which the cost must be below that of the smaller subset"
     )
-    functions: int = _bounds(
+    functions: int = bounds(
         2, "maximum number of free functions for unknown physics; 0: none"
     )
-    elements: int = _bounds(
+    elements: int = bounds(
         1, "use of elements with internal states; 0: never, 1: if needed, 2: always"
     )
-    function_lengths: tuple[float, ...] = _bounds(
+    function_lengths: tuple[float, ...] = bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
         "correlation lengths of a free function, as fractions of the range of its "
         "argument or, for a phase, in radians",
     )
-    function_sizes: tuple[float, ...] = _bounds(
+    function_sizes: tuple[float, ...] = bounds(
         (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6),
         "amplitudes of a free function, in mean standard errors of its coefficients",
     )
-    promising: float = _bounds(
+    promising: float = bounds(
         0.5, "minimum gain of a free function that is fitted, relative to the largest"
     )
-    rivalling: float = _bounds(0.9, "the same minimum if a function explains the data")
-    followed: int = _bounds(
+    rivalling: float = bounds(0.9, "the same minimum if a function explains the data")
+    followed: int = bounds(
         3, "maximum number of free functions, terms and forms fitted per stage"
     )
-    outdone: float = _bounds(1.25, "maximum cost of a form, relative to the curve's")
-    enough: float = _bounds(
+    outdone: float = bounds(1.25, "maximum cost of a form, relative to the curve's")
+    enough: float = bounds(
         0.1, "fraction of the tolerated residual below which the search ends"
     )
-    heats: int = _bounds(
+    heats: int = bounds(
         4, "maximum number of fits of a free function in which its prior must converge"
     )
-    recentred: int = _bounds(
+    recentred: int = bounds(
         12, "maximum number of additional fits for the parameters of an element"
     )
-    heated: float = _bounds(
+    heated: float = bounds(
         1.5, "ratio of consecutive costs below which the prior has converged"
     )
-    bootstrap: int = _bounds(
+    bootstrap: int = bounds(
         200, "number of bootstrap samples, both of blocks and of drive signals"
     )
-    frequency_grid: int = _bounds(
+    frequency_grid: int = bounds(
         4, "number of frequencies per resolution cell of a scan"
     )
-    cause_strengths: tuple[float, float, int] = _bounds(
+    cause_strengths: tuple[float, float, int] = bounds(
         (0.1, 1.5, 24),
         "strengths tried in a fit to event speeds: the first strength, the ratio of "
         "consecutive strengths, and their number",
     )
-    cause_worse: float = _bounds(
+    cause_worse: float = bounds(
         4.0, "multiple of the smallest misfit above which this series ends"
     )
-    cause_difference: float = _bounds(
+    cause_difference: float = bounds(
         1e-3, "relative step of the finite differences in that fit"
     )
-    cause_fits: int = _bounds(40, "maximum number of evaluations in that fit")
-    trace_stride: float = _bounds(
+    cause_fits: int = bounds(40, "maximum number of evaluations in that fit")
+    trace_stride: float = bounds(
         0.1, "step in the trace of the monodromy matrix along a branch"
     )
-    orbit_speeds: tuple[float, ...] = _bounds(
+    orbit_speeds: tuple[float, ...] = bounds(
         (1.18, 1.14, 1.22, 1.1, 1.26, 1.32, 1.4),
         "multiples of the detachment speed at which P(1,1) is sought",
     )
-    chatter_speeds: tuple[float, float] = _bounds(
+    chatter_speeds: tuple[float, float] = bounds(
         (1.1, 1.4),
         "multiples of the detachment speed that bracket the interruption of chatter",
     )
-    drawn_rigs: int = _bounds(12, "number of rigs drawn to estimate prediction errors")
-    next_speeds: int = _bounds(7, "number of speeds compared for the next recording")
-    next_beyond: float = _bounds(
+    drawn_rigs: int = bounds(12, "number of rigs drawn to estimate prediction errors")
+    next_speeds: int = bounds(7, "number of speeds compared for the next recording")
+    next_beyond: float = bounds(
         0.05, "relative extension of the recorded speed range at either end"
     )
-    next_settle: float = _bounds(6.0, "settling time (s) of a simulated rig")
+    next_settle: float = bounds(6.0, "settling time (s) of a simulated rig")
 
     # settings of the report
-    ripple_errors: float = _shows(
+    ripple_errors: float = shows(
         3.0, "ripple amplitude, in standard errors, above which a recording is listed"
     )
-    shown_chance: float = _shows(
+    shown_chance: float = shows(
         1e-3, "significance level at which a recording shows a named effect"
     )
-    as_noise: float = _shows(
+    as_noise: float = shows(
         1.2, "ratio of rms residual to noise above which a caveat is added"
     )
-    decoy: float = _shows(
+    decoy: float = shows(
         0.5, "fraction of a function's gain that its decoy may reach without a caveat"
     )
-    moved_errors: float = _shows(
+    moved_errors: float = shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
-    rival: float = _shows(
+    rival: float = shows(
         30.0, "difference in BIC up to which the next recording separates alternatives"
     )
-    absent_errors: float = _shows(
+    absent_errors: float = shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"
     )
-    cost_errors: float = _bounds(
+    cost_errors: float = bounds(
         3.0, "largest excess cost, in standard deviations, that is attributed to noise"
     )
-    nearby: float = _shows(
+    nearby: float = shows(
         0.03,
         "distance, as a fraction of the range, within which data count as near a point",
     )
-    visited: float = _shows(
+    visited: float = shows(
         0.1, "minimum data density, relative to a uniform density, to show a function"
     )
-    shape_points: int = _shows(144, "number of points on the curve of a function")
-    several: int = _shows(6, "maximum number of recordings whose values are listed")
-    alternatives: int = _shows(8, "maximum number of alternatives listed")
+    shape_points: int = shows(144, "number of points on the curve of a function")
+    several: int = shows(6, "maximum number of recordings whose values are listed")
+    alternatives: int = shows(8, "maximum number of alternatives listed")
 
     def __post_init__(self):
         for name in ("false_alarms", "sure", "explains", "form_error"):

@@ -11,6 +11,7 @@ import numpy as np
 from ._doubts import far_from_data
 from ._fit_result import finish, Fit
 from .engine import (
+    already_loose,
     assemble,
     Blocks,
     Costs,
@@ -111,7 +112,7 @@ def fit(
         most = max(iterations, _ITERATIONS)
         return _descend(problem, columns, loose, point, prior, most).point
 
-    long = problem.longest_flight > _LONG and fresh
+    long = problem.longest_flight > _LONG and fresh and not already_loose(extras)
     first = loosely() if long else point
     found = _descend(problem, columns, extras, first, prior, iterations, stop, progress)
     # if the cost is far above the noise, there may be a better optimum; a caller who

@@ -20,3 +20,7 @@ from ._visited_states import (
     visited_states as visited_states,
     VisitedStates as VisitedStates,
 )
+from ._whole_flights import (
+    whole_flights as whole_flights,
+    WholeFlights as WholeFlights,
+)

@@ -11,7 +11,6 @@ from ..search import (
     FreeSearch,
     Missing,
     Question,
-    Search,
     Trial,
     Trials,
     within_tolerances,
@@ -25,6 +24,7 @@ from ._redrawn import Needs, needs, redrawn, sure
 from ._rivals import Rival, rivals
 from ._structure import Structure, structures
 from ._visited_states import visited_states
+from ._whole_flights import WholeFlights
 
 
 class Outside(NamedTuple):
@@ -58,6 +58,7 @@ class Choice:
         the residual of the chosen fit.
     - `tied`: a parameter whose separate values explain the data as well as the
         functions do.
+    - `whole`: residuals over complete flights, if model errors were allowed for.
     - `left_before`, `left_after`: structures in the residuals of `before` and `best`.
     """
 
@@ -78,6 +79,7 @@ class Choice:
     rivals: tuple[Rival, ...] = ()
     differing: Differing | None = None
     tied: Differing | None = None
+    whole: WholeFlights | None = None
 
     @property
     def unexplained(self) -> list[Structure]:
@@ -85,14 +87,25 @@ class Choice:
         kind by its excess over the threshold."""
         return [one for one in self.left_after if one.significant]
 
+    @property
+    def fit(self) -> Fit:
+        """The fit of the chosen model."""
+        return self.best.fit if self.missing is None else self.missing.fit
 
-def choose(question: Question, trials: Trials, seed: int) -> Choice:
-    """Search, drop terms that depend on a few blocks, and test the residuals.
+    def explained(self, policy: Policy) -> bool:
+        """Return whether the terms and functions leave only noise."""
+        found = self.fit
+        return found.cost < policy.as_noise**2 * found.problem.samples
+
+
+def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choice:
+    """Drop terms that depend on a few blocks, and test the residuals.
+
+    **Arguments:** the question, its fits, the best subset of terms, and the seed.
 
     A doubtful term is named if no structure remains with it but much remains without
     it, provided that it improves the prediction of held-out data.
     """
-    found = Search(trials).run()
     trials.progress("drawing bootstrap samples", None)
     found, masked = unmasked(trials, found)
     best, inclusion, deviation, doubtful = sure(trials, found, seed)

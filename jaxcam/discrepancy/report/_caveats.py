@@ -26,6 +26,7 @@ class Reason(enum.StrEnum):
     ABOVE_NOISE = "above the noise"
     BEYOND_TOLERANCE = "beyond tolerance"
     NOISIER = "noisier than stated"
+    MODEL_ERROR = "errors of the model"
     SET_ASIDE = "record set aside"
 
 
@@ -82,11 +83,15 @@ def caveats_of(
         yield above_noise(held, named)
 
 
-def differs(found: Differing, policy: Policy) -> Caveat:
-    """Return the caveat that a parameter differs from recording to recording."""
+def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:
+    """Return the caveat that a parameter differs from recording to recording.
+
+    **Arguments:** `called`: its description, if its name means nothing to a reader.
+    """
     return Caveat(
         Reason.DIFFERING,
-        f"The recordings differ: a separate {spelled(found.name)} for each of them "
+        f"The recordings differ: a separate {called or spelled(found.name)} for each "
+        "of them "
         f"({_values_of(found, policy)}) explains {percent(found.share)} of the squared "
         f"residual above the noise and leaves {ratio(found.left)} times the noise. The "
         "quantity that this parameter represents has changed between the recordings.",
@@ -126,6 +131,31 @@ def noisier_than_stated(question: Question) -> Iterator[Caveat]:
             f"{ratio(one.seen / one.stated)} times the stated noise "
             f"({one.stated:.3g}); "
             "the larger value was used.",
+        )
+
+
+def model_errors(question: Question, choice: Choice) -> Iterator[Caveat]:
+    """Return caveats for a model that is so far from the data that its errors were
+    allowed for.
+    """
+    whole, unit = choice.whole, question.unit
+    for one in question.model_errors:
+        more = f", and deviations below {one.used:.3g} were treated as noise"
+        yield Caveat(
+            Reason.MODEL_ERROR,
+            "The model is far from the data: on single pieces of flight, the residual "
+            f"of the textbook model in `{one.channel}` is {one.residual:.3g}, "
+            f"{ratio(one.residual / one.stated)} times the noise ({one.stated:.3g}). "
+            "The pieces of a flight were therefore allowed to join inexactly"
+            f"{more if one.used > one.stated else ''}. All residuals of this report "
+            "refer to single pieces.",
+        )
+    if whole is not None:
+        yield Caveat(
+            Reason.MODEL_ERROR,
+            "Fitted to complete flights, the textbook model has an rms residual of "
+            f"{quantity(f'{whole.before:.3g}', unit)} and the chosen model one of "
+            f"{quantity(f'{whole.after:.3g}', unit)}.",
         )
 
 

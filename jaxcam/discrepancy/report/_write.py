@@ -32,6 +32,7 @@ from ._caveats import (
     functions_fall_short,
     functions_tie,
     may_differ,
+    model_errors,
     noisier_than_stated,
     small_remainder,
 )
@@ -43,7 +44,7 @@ from ._effects import (
     term_effects,
     unknown_effect,
 )
-from ._missing import missing_functions
+from ._missing import missing_functions, named_function
 from ._summary import summary_of, summary_of_functions
 
 
@@ -70,7 +71,7 @@ def diagnosis_of(
         effects.insert(0, unknown_effect(trials, choice, divided.left))
     others = fitted_alternatives(trials, choice)[: policy.alternatives]
     ties = [trial for trial in others if abs(trial.bic - best.bic) < policy.tie]
-    caveats += noisier_than_stated(question)
+    caveats += [*noisier_than_stated(question), *model_errors(question, choice)]
     caveats += caveats_of(trials, choice, ties, bool(effects))
     model = question.problem.model
     floor = float(model.sensors[watching(model)].floor)
@@ -176,7 +177,11 @@ def _of_functions(
         _pulls(question, within, found),
         {},
         {},
-        (*noisier_than_stated(question), *_doubts_of(choice, missing, policy)),
+        (
+            *noisier_than_stated(question),
+            *model_errors(question, choice),
+            *_doubts_of(choice, missing, policy),
+        ),
         policy,
         functions,
         misfit_by_part(bare.fit, policy),
@@ -188,7 +193,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     """Return caveats if the functions leave a residual, do not predict the held-out
     data, or explain no more than others do.
     """
-    left, held = rms_of(missing.fit), choice.held
+    left, held = missing.fit, choice.held
     for rival in choice.rivals:
         if rival.share > 1 - policy.sure:
             yield functions_tie(rival_name(rival), rival)
@@ -196,11 +201,15 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     if share > policy.decoy:
         yield decoy_explains(share)
     if choice.differing is not None:
-        yield differs(choice.differing, policy)
+        parts = [
+            p for p in missing.functions if choice.differing.name in p.coefficients
+        ]
+        called = [f"coefficient of the {named_function(left, p)}" for p in parts]
+        yield differs(choice.differing, policy, *called)
     if choice.tied is not None:
         yield may_differ(choice.tied, policy)
-    if left > policy.as_noise:
-        yield functions_fall_short(left)
+    if rms_of(left) > policy.as_noise:
+        yield functions_fall_short(rms_of(left))
     elif held.after > policy.as_noise:
         yield above_noise(held, True)
 

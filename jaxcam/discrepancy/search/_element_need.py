@@ -42,11 +42,18 @@ class ElementNeed:
     def remains(self, problem: Problem, found: Missing | None, least: float) -> bool:
         """Return whether an element may explain what functions leave.
 
+        If the fit with functions is far from the data, any element is predicted to
+        gain; it must then explain most of what remains.
+
         **Arguments:** a fit with functions that leaves a residual, and the gain that an
         element must add to it.
         """
         if self.comparable or found is None:
             return self.comparable
+        heat = heat_of(found.fit)
+        if heat > self.policy.near:
+            left = (found.fit.cost - found.fit.problem.samples) / heat
+            least = max(least, self.policy.explains * left)
         return self._promised(problem, found) > least
 
     def _promised(self, problem: Problem, found: Missing) -> float:

@@ -59,8 +59,10 @@ class FreeSearch:
         self.families = tuple(families)
         # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
-        # candidates for the first function
+        # candidates for the first function, and the costs of those fitted to single
+        # pieces
         self.first: list[Lead] | None = None
+        self.alone: dict[str, float] = {}
         gaps = sorted({f.constraint for f in families if f.where is Where.IMPACT})
         unit = self.families[0].motion_unit
         driven = driven_by(problem, unit) if elements or policy.elements else None
@@ -141,13 +143,16 @@ class FreeSearch:
 
     def _others(self) -> list[Lead]:
         """Return the candidates for the first function that were not fitted to whole
-        recordings.
+        recordings, except those that single pieces of flight rule out.
         """
         fitted = {one.label for trial in self.tried for one in trial.functions}
+        most = self.policy.hopeless * min(self.alone.values(), default=math.inf)
         return [
             lead
             for lead in self.first or []
-            if lead.family is not None and lead.label not in fitted
+            if lead.family is not None
+            and lead.label not in fitted
+            and self.alone.get(lead.label, 0.0) <= most
         ]
 
     def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
@@ -207,6 +212,8 @@ class FreeSearch:
                 said = lead.label.replace("_", " ")
                 self.progress(f"fitting {said}", None)
                 trial = self._with(problem, found, lead)
+                if trial is not None and apart and leads is self.first:
+                    self.alone[lead.label] = trial.fit.cost
                 if trial is not None and trial.score < best.score:
                     best = trial
             grown = found.score - best.score

@@ -41,6 +41,9 @@ _STIFFENING_SHAPES = ((-0.3, 1.0), (-2.0, 1.0), (-0.3, 2.0), (-2.0, 2.0))
 _AT_ONCE = 8_000_000
 # Relative increase of a diagonal that keeps a matrix positive definite
 _FORCES = 1e-9
+# Minimum fraction of the information on a force that must remain when the other
+# parameters are free
+_ALIKE = 1e-8
 
 
 class Promise(NamedTuple):
@@ -169,8 +172,10 @@ class _Chain:
         taken = across @ inside
         left = pull - taken @ score
         matrix = own - taken @ np.swapaxes(across, 1, 2)
-        diagonal = np.maximum(np.einsum("wii->wi", matrix), TINY)
-        scale = 1 / np.sqrt(diagonal)
+        diagonal = np.einsum("wii->wi", matrix)
+        # a force that acts like the free parameters, or not at all, has no strength
+        apart = diagonal > _ALIKE * np.einsum("wii->wi", own) + TINY
+        scale = np.where(apart, 1 / np.sqrt(np.where(apart, diagonal, 1.0)), 0.0)
         matrix = matrix * scale[:, :, None] * scale[:, None, :]
         matrix = matrix + _FORCES * np.eye(matrix.shape[-1])
         solved = np.linalg.solve(matrix, (left * scale)[..., None])[..., 0]

@@ -42,6 +42,8 @@ class Question:
         `drive_noise`.
     - `shown`: parameters that are reported in another form.
     - `noisier`: channels with more noise than stated.
+    - `model_errors`: residuals of the channels, if the model is so far from the data
+        that its errors are allowed for.
     - `location`: coordinate and gap on which missing physics acts.
     """
 
@@ -57,6 +59,7 @@ class Question:
     drive_channel: str = "cam_angle_rad"
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
     noisier: tuple["Noisier", ...] = ()
+    model_errors: tuple["ModelError", ...] = ()
     location: Location = Location()
 
 
@@ -66,6 +69,23 @@ class Noisier(NamedTuple):
     channel: str
     stated: float
     seen: float
+
+
+class ModelError(NamedTuple):
+    """A channel with its `stated` noise, the rms `residual` of the textbook model on
+    single pieces of flight, and the noise that was `used`.
+    """
+
+    channel: str
+    stated: float
+    residual: float
+    used: float
+
+
+def with_noise(sensor: Sensor, level: float) -> Sensor:
+    """Return a sensor whose noise and rounding have a given standard deviation."""
+    white = math.sqrt(level**2 - sensor.resolution**2 / 12)
+    return dataclasses.replace(sensor, noise=jnp.asarray(white))
 
 
 def with_seen_noise(
@@ -82,8 +102,7 @@ def with_seen_noise(
         seen = float(np.median(levels))
         if sensor.filtered or not seen > policy.noisier * stated:
             continue
-        white = math.sqrt(seen**2 - sensor.resolution**2 / 12)
-        found[name] = dataclasses.replace(sensor, noise=jnp.asarray(white))
+        found[name] = with_noise(sensor, seen)
         noisier.append(Noisier(name, stated, seen))
     return found, tuple(noisier)
 

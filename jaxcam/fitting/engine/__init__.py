@@ -50,6 +50,12 @@ from ._predict import runge_kutta as runge_kutta
 from ._problem import Problem as Problem, Weights as Weights
 from ._problem_checks import parameter_places as parameter_places
 from ._seen_directly import shows_directly as shows_directly
-from ._sharpness import loosened as loosened, separated as separated
+from ._sharpness import (
+    allowing as allowing,
+    already_loose as already_loose,
+    JOINT as JOINT,
+    loosened as loosened,
+    separated as separated,
+)
 from ._starts import state_size as state_size
 from ._switched_steps import EVENTS as EVENTS, switched_nodes as switched_nodes

@@ -21,12 +21,15 @@ from ._through_nodes import normal_through, shares_of
 class Sharpness(NamedTuple):
     """Standard errors of the joints of one recording, and of the state of a typical
     piece.
+
+    `apart` is the factor on the errors of joints that separates the pieces.
     """
 
     flight: Float[Array, "k n"]
     impact: Float[Array, "k n"]
     gap: Float[Array, " k"]
     piece: Float[Array, "k n"]
+    apart: Float[Array, ""]
 
 
 class Extras(NamedTuple):

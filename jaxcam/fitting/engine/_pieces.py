@@ -30,6 +30,10 @@ _PIECE = 100
 _LEAST, _TIED = 8, 3
 # The number of samples in a step is rounded up to a multiple of this
 _SHARED = 4
+# The number of pieces is rounded up to a multiple of the first number, so that similar
+# records share a program; if a piece has more steps than the last number, padding takes
+# longer than compiling, and the second number is used
+_PADDED, _LESS_PADDED, _FEW_STEPS = 64, 8, 20
 # predecessor of a piece
 FREE, FLIGHT, IMPACT = 0, 1, 2
 # Half-width (samples) of the search for the time of an impact about the recorded one
@@ -197,7 +201,8 @@ def gather(
             f"{names}: there is no flight of at least {_LEAST} samples to fit; give a "
             "recording in which the motion leaves the surface."
         )
-    width = 64 * -(-max(len(flown) for flown, _ in cuts) // 64)
+    multiple = _PADDED if steps <= _FEW_STEPS else _LESS_PADDED
+    width = multiple * -(-max(len(flown) for flown, _ in cuts) // multiple)
     # zero without contacts, so that the program for contacts is not compiled
     resting = 32 * -(-max(len(rested) for _, rested in cuts) // 32)
     most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))

@@ -75,8 +75,8 @@ from ._starts import state_size, suggested_starts
 from ._step_size import (
     enough_substeps,
     followed_by_cubics,
-    follows_inputs,
     longest_flight,
+    steps_for_inputs,
 )
 
 
@@ -181,15 +181,16 @@ class Problem:
             pieces, cuts = gather(
                 segments, tuple(model.sensors), steps, measured, curved, rests
             )
-            if steps < _MOST_STEPS and not follows_inputs(model, segments, pieces):
-                steps *= 2
+            needed = steps_for_inputs(model, segments, pieces, steps)
+            if needed > steps and steps < _MOST_STEPS:
+                steps = min(needed, _MOST_STEPS)
                 continue
             states, guess = suggested_starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
             refuse_not_finite(layout, segments, pieces, point)
             if steps >= _MOST_STEPS or followed_by_cubics(layout, pieces, point):
                 break
-            steps *= 2
+            steps = min(2 * steps, _MOST_STEPS)
         extras = joint_sharpness(layout, pieces, point, guess)
         pieces = enough_substeps(layout, pieces, extras, point, longest_flight(cuts))
         pieces = jax.tree.map(jnp.asarray, pieces)

@@ -21,6 +21,8 @@ JOINT = 1e-3
 # adds a negligible tenth to their variance, and removes the effects of chaos and of
 # small model errors
 _IMPACT = 10**-0.5
+# Error of a joint, relative to that of a single piece, above which it counts as loose
+_LOOSE = 0.1
 _WIDTH = 4
 # Number of columns above which the width of a program follows the number of free
 # parameters, and the difference between widths
@@ -51,9 +53,10 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
     records, width = pieces.joint.shape
     size = point.states.shape[-1]
     one = jnp.ones((records, width, size))
+    apart = jnp.full(records, 1 / JOINT)
     extras = Extras(
         jnp.asarray(guess),
-        Sharpness(one, one, one[..., 0], one),
+        Sharpness(one, one, one[..., 0], one, apart),
         jnp.asarray(pieces.exists, dtype=float),
         jnp.asarray(pieces.rest_exists, dtype=float),
     )
@@ -70,7 +73,9 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
         # a component determined by the drive is known as accurately as the drive
         by_drive = _drive_in_flight(layout, pieces, point)
         flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
-    sharp = extras._replace(sharpness=Sharpness(flight, flight, one[..., 0], piece))
+    sharp = extras._replace(
+        sharpness=Sharpness(flight, flight, one[..., 0], piece, apart)
+    )
     inner = jnp.where(jnp.asarray(pieces.joint) == IMPACT, 0, pieces.joint)
     flights = eqx.tree_at(lambda p: p.joint, pieces, inner)
     blocks, _ = states_only(layout, flights, sharp, point)
@@ -80,7 +85,7 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
     slope, by_drive = _drive_slopes(layout, pieces, point)
     gap = jnp.sqrt(jnp.sum(slope**2 * known, axis=-1) + by_drive[..., -1] ** 2)
     impact = jnp.sqrt(known + by_drive[..., :-1] ** 2)
-    return extras._replace(sharpness=Sharpness(flight, impact, gap, piece))
+    return extras._replace(sharpness=Sharpness(flight, impact, gap, piece, apart))
 
 
 def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
@@ -108,6 +113,14 @@ def loosened(extras: Extras) -> Extras:
     return extras._replace(sharpness=sharpness._replace(flight=sharpness.piece))
 
 
+def already_loose(extras: Extras) -> bool:
+    """Return whether the joints within flights are nearly as loose as `loosened`
+    makes them.
+    """
+    sharp = extras.sharpness
+    return bool(np.all(np.asarray(sharp.flight) > _LOOSE * np.asarray(sharp.piece)))
+
+
 def separated(extras: Extras) -> Extras:
     """Return joints that are so loose that each piece is fitted separately.
 
@@ -117,7 +130,29 @@ def separated(extras: Extras) -> Extras:
     sharp = extras.sharpness
     return extras._replace(
         sharpness=sharp._replace(
-            flight=sharp.piece, impact=sharp.impact / JOINT, gap=sharp.gap / JOINT
+            flight=sharp.piece,
+            impact=sharp.impact * sharp.apart[:, None, None],
+            gap=sharp.gap * sharp.apart[:, None],
+        )
+    )
+
+
+def allowing(extras: Extras, part: float) -> Extras:
+    """Return joints whose errors are a given multiple of those of separate pieces.
+
+    A model with errors does not predict where a piece begins from the end of the
+    previous piece; `part` is the size of its error relative to that of the state of a
+    single piece.
+    """
+    sharp, most = extras.sharpness, max(part, 1.0)
+    looser = part * sharp.apart
+    return extras._replace(
+        sharpness=Sharpness(
+            part * sharp.piece,
+            looser[:, None, None] * sharp.impact,
+            looser[:, None] * sharp.gap,
+            most * sharp.piece,
+            jnp.full_like(sharp.apart, most / part),
         )
     )
 

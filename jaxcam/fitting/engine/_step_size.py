@@ -1,6 +1,7 @@
 """Check that the steps of pieces are short enough for the model and its sensors."""
 
 import dataclasses
+import math
 
 import jax
 import jax.numpy as jnp
@@ -26,6 +27,9 @@ _LONG = 16
 # Step divided by the time constant of a filter; the Hermite error is then 1e-4 of a
 # jump
 _FILTER_STEP = 0.4
+# A larger number of steps is rounded up to a multiple of this, so that similar problems
+# share a program
+_MULTIPLE = 20
 
 
 def longest_flight(cuts) -> int:
@@ -34,18 +38,26 @@ def longest_flight(cuts) -> int:
     return max(int(np.max(count, initial=0)) for count in counts)
 
 
-def follows_inputs(model: Model, segments, pieces: Pieces) -> bool:
-    """Return whether the steps resolve the input and the sensor filters.
+def steps_for_inputs(model: Model, segments, pieces: Pieces, steps: int) -> int:
+    """Return the number of steps of a piece that resolve the input and the sensor
+    filters, at least the present number `steps`.
 
-    After an impact, a filter has not settled, and the initial states do not account for
-    this.
+    An input is constant or linear between its samples. After an impact, a filter has
+    not settled, and the initial states do not account for this.
     """
-    longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    longest = steps * float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
     interval = min(part.recording.interval for part in segments)
-    if isinstance(model.drive, Input) and longest > interval:
-        return False
-    corners = [2 * np.pi * s.bandwidth_hz for s in model.sensors.values() if s.filtered]
-    return all(longest * corner <= _FILTER_STEP for corner in corners)
+    bounds = [
+        _FILTER_STEP / (2 * np.pi * s.bandwidth_hz)
+        for s in model.sensors.values()
+        if s.filtered
+    ]
+    if isinstance(model.drive, Input):
+        bounds.append(interval)
+    needed = max((longest / bound for bound in bounds), default=0.0)
+    if needed <= steps:
+        return steps
+    return _MULTIPLE * math.ceil(needed / _MULTIPLE)
 
 
 def followed_by_cubics(layout: Layout, pieces: Pieces, point: Point) -> bool:

@@ -1,0 +1,45 @@
+"""The residual over complete flights, of a fit that allows for model errors."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ...fitting import Fit, fit, residuals
+from ...fitting.engine import allowing, JOINT
+from ..policy import Policy
+from ..search import given_up
+from ..terms import watching
+
+
+class WholeFlights(NamedTuple):
+    """Rms residuals over complete flights in the main channel, in its unit, without
+    (`before`) and with (`after`) what was found.
+    """
+
+    before: float
+    after: float
+
+
+def whole_flights(before: Fit, after: Fit, policy: Policy) -> WholeFlights:
+    """Fit the chosen model to complete flights, starting from its fit to single pieces.
+
+    **Arguments:** the fit of the textbook model to complete flights; the fit of the
+    chosen model, in which the pieces may join inexactly; the policy.
+    """
+    problem = after.problem
+    joined = dataclasses.replace(problem, extras=allowing(problem.extras, JOINT))
+    found = fit(
+        joined,
+        free=after.free,
+        start=after.point,
+        iterations=policy.quick_iterations,
+        stop=given_up(problem.samples, policy),
+    )
+    return WholeFlights(_rms(before), _rms(found))
+
+
+def _rms(found: Fit) -> float:
+    main = watching(found.problem.model)
+    parts = [one.value for one in residuals(found) if one.channel == main]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))

@@ -1,0 +1,160 @@
+"""Models so far from the data that their errors are allowed for."""
+
+import dataclasses
+import math
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from jaxcam import HybridSystem
+from jaxcam.discrepancy import diagnose, library, Policy, Verdict
+from jaxcam.discrepancy.report import Reason
+from jaxcam.discrepancy.search import far_from_data, system_question, with_model_error
+from jaxcam.fitting import fit, Parameter, Sensor
+from jaxcam.fitting.engine import allowing, JOINT, separated
+from jaxcam.recordings import Recording, segment
+
+
+_TIME = 5e-3 * np.arange(1600)
+_NOISE = 1e-7
+
+
+class Swing(HybridSystem):
+    """A damped mass on a spring, far from any stop."""
+
+    stiffness: float = 149.0
+    damping: float = 0.1
+
+    def vector_field(self, t, state):
+        force = self.stiffness * state[0] + self.damping * state[1]
+        return jnp.stack([state[1], -force])
+
+    def gap(self, t, state):
+        return state[0] + 100.0
+
+    def impact(self, t, state):
+        return state
+
+
+_PARAMETERS = (
+    Parameter("stiffness", lambda m: m.system.stiffness, 3.0, unit="1/s^2"),
+    Parameter("damping", lambda m: m.system.damping, 0.05, unit="1/s"),
+)
+
+
+def _segments(force, noise=_NOISE):
+    """Two free oscillations with an additional force, integrated with scipy."""
+    rng, parts = np.random.default_rng(2), []
+    for k, start in enumerate((0.3, 0.2)):
+        found = solve_ivp(
+            lambda t, y: [y[1], -150.0 * y[0] - 0.1 * y[1] + force(*y)],
+            (0, _TIME[-1]),
+            [start, 0.0],
+            "DOP853",
+            _TIME,
+            rtol=1e-11,
+            atol=1e-13,
+        )
+        angle = found.y[0] + noise * rng.standard_normal(len(_TIME))
+        run = Recording(f"run{k}", _TIME, {"angle_rad": angle})
+        parts.append(segment(run, "angle_rad", noise=noise))
+    return parts
+
+
+def _bumps(position, velocity):
+    """A force that no term of the library describes."""
+    return 2.0 * math.sin(60 * position) * math.cos(3 * velocity)
+
+
+def _terms(*names):
+    return [term for term in library(turned=False) if term.name in names]
+
+
+@pytest.fixture(scope="module")
+def question():
+    return system_question(
+        Swing(),
+        tuple(_segments(_bumps)),
+        _terms("nonlinear_spring"),
+        {"angle_rad": Sensor(0, noise=_NOISE)},
+        _PARAMETERS,
+        None,
+        lambda sentence, fraction: None,
+        Policy(),
+    )
+
+
+def test_joints_that_allow_for_errors_keep_their_proportions(question):
+    """Errors scale with a single piece; to separate pieces never tightens a joint."""
+    given = question.problem.extras
+    one = given.sharpness
+    for part in (0.02, 30.0):
+        found = allowing(given, part)
+        new, apart = found.sharpness, separated(found).sharpness
+        np.testing.assert_allclose(new.flight, part * one.piece)
+        np.testing.assert_allclose(new.impact, part / JOINT * one.impact)
+        np.testing.assert_allclose(apart.flight, max(part, 1.0) * one.piece)
+        np.testing.assert_allclose(apart.impact, max(part, 1.0) / JOINT * one.impact)
+        again = allowing(found, JOINT).sharpness
+        np.testing.assert_allclose(again.impact, max(part, 1.0) * one.impact)
+    np.testing.assert_allclose(
+        separated(given).sharpness.gap, allowing(given, 1.0).sharpness.gap
+    )
+
+
+def test_noise_and_joints_are_as_large_as_the_errors(question):
+    """The noise is `resolved` times the residual, and a component of a joint costs as
+    much as a sample, within a factor of two."""
+    policy = Policy()
+    assert far_from_data(fit(question.problem, free=question.rig), policy)
+    found = with_model_error(question, policy)
+    (one,) = found.model_errors
+    before = float(question.problem.model.sensors["angle_rad"].floor)
+    assert one.channel == "angle_rad" and one.stated == pytest.approx(before)
+    assert one.used == pytest.approx(policy.resolved * one.residual)
+    floor = float(found.problem.model.sensors["angle_rad"].floor)
+    assert floor == pytest.approx(one.used)
+    problem = found.problem
+    best = fit(
+        problem, free=question.rig, start=problem.start, stop=lambda costs: False
+    )
+    joints = int(np.sum(np.asarray(problem.pieces.joint) > 0))
+    cost = np.sum(best.costs.joints) / (2 * joints)
+    samples = np.sum(best.costs.flown) / problem.samples
+    assert 1 / 3 < cost / samples < 3
+    assert math.sqrt(samples) == pytest.approx(1 / policy.resolved, rel=0.2)
+
+
+@pytest.mark.slow
+def test_physics_that_is_found_is_fitted_with_the_stated_noise():
+    """Quadratic drag: 1000 times the noise without it, only noise with it."""
+    found = diagnose(
+        Swing(),
+        _segments(lambda x, v: -0.05 * abs(v) * v),
+        _terms("quadratic_drag", "nonlinear_spring"),
+        sensors={"angle_rad": Sensor(0, noise=_NOISE)},
+        parameters=list(_PARAMETERS),
+    )
+    assert found.verdict is Verdict.EFFECT and found.names == ("quadratic_drag",)
+    assert found.heldout_before > 100 * _NOISE
+    assert found.heldout_after < 1.2 * _NOISE
+    assert Reason.MODEL_ERROR not in {one.reason for one in found.caveats}
+
+
+@pytest.mark.slow
+def test_a_model_that_stays_far_off_says_so():
+    """The caveats give the residuals on single pieces and over complete flights."""
+    found = diagnose(
+        Swing(),
+        _segments(_bumps),
+        _terms("nonlinear_spring"),
+        sensors={"angle_rad": Sensor(0, noise=_NOISE)},
+        parameters=list(_PARAMETERS),
+        policy=dataclasses.replace(Policy(), functions=0),
+    )
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.noise_floor > 10 * _NOISE
+    said = [str(one) for one in found.caveats if one.reason is Reason.MODEL_ERROR]
+    assert "single pieces" in said[0] and "complete flights" in said[1]
