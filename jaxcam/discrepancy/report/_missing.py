@@ -35,6 +35,9 @@ _KINDS = {
     Where.CONTACT: "surface",
     Where.SENSOR: "sensor",
 }
+# Ratio of the errors with and without a straight line above which the line is not
+# determined
+_UNDETERMINED = 3.0
 # Points at which a function is evaluated, for each point that is kept
 _FINER = 20
 _VERBS = {
@@ -61,7 +64,8 @@ class MissingFunction:
         time (s) since a unit deflection, or, for a hysteretic force, the distance from
         the last reversal.
     - `value`, `stderr`: value and standard error in `unit` at the points of the grid,
-      `(n,)` or `(n, m)`.
+      `(n,)` or `(n, m)`. If rig parameters act like a constant or a straight line, that
+      part of the value is not determined, and the error is that of the remainder.
     - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
     - `nearly`: otherwise the formula of the best form, if it is close.
@@ -165,9 +169,13 @@ def _one(
     if one.primitive is not None:
         along = _graded(along, lambda x: _curve(one, x, numbers)[0])
     value, basis = _curve(one, along, numbers)
-    error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
-    words, formula = _words(family, kind, along, value, error), None
-    if one.primitive is not None:
+    error = _errors(basis, covariance)
+    if one.primitive is None:
+        level = _errors(_level(family, along, basis), covariance)
+        words, formula = _words(family, kind, along, value, level), None
+        if np.median(error) > _UNDETERMINED * np.median(level):
+            error = level
+    else:
         formula, words = formula_of(family, one.primitive, numbers, kind)
     nearly = None
     if close is not None:
@@ -201,6 +209,24 @@ def _one(
         gap=gap,
         nearly=nearly,
     )
+
+
+def _errors(basis, covariance):
+    """Return the standard errors of linear combinations (rows) of coefficients."""
+    return np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
+
+
+def _level(family: Family, along, values):
+    """Return functions (columns) without the part that rig parameters can represent:
+    a constant, and a straight line if the argument is a position or velocity.
+    """
+    return values - np.vander(along, _degree(family) + 1) @ np.polyfit(
+        along, values, _degree(family)
+    )
+
+
+def _degree(family: Family) -> int:
+    return 0 if family.periodic or family.argument is Variable.TIME else 1
 
 
 def _formula(found: Fit, form: Free) -> tuple[str, str]:
@@ -295,7 +321,10 @@ def _unit(family: Family) -> str:
 
 
 def _words(family: Family, kind: str, along, value, error) -> str:
-    """Describe a function, and the point where it is largest relative to its error."""
+    """Describe a function, and the point where it differs most from a straight line.
+
+    **Arguments:** the values along the argument; the errors of this difference.
+    """
     of = " and ".join(family.arguments)
     if family.factor is Factor.VELOCITY:
         what = f"damping that depends on the {family.argument}"
@@ -306,13 +335,12 @@ def _words(family: Family, kind: str, along, value, error) -> str:
     else:
         what = f"{_VERBS[kind]} that depends on the {of}"
     # a part that the rig parameters can represent has no location
-    degree = 0 if family.periodic or family.argument is Variable.TIME else 1
-    level = value - np.polyval(np.polyfit(along, value, degree), along)
+    level = _level(family, along, value)
     sure = np.abs(level) > 2 * error
     k = int(np.argmax(np.where(sure, np.abs(level), -1.0)))
     if not np.any(sure):
         return f"{what}; its location is unclear"
-    usual = "a constant" if degree == 0 else "a straight line"
+    usual = "a constant" if _degree(family) == 0 else "a straight line"
     return (
         f"{what}; it differs most from {usual} at {family.argument} {along[k]:.3g}, "
         f"by {level[k]:.2g} +- {error[k]:.1g}"
