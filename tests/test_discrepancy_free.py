@@ -1,5 +1,6 @@
 """Free functions: their spline, their prior, and what a diagnosis makes of them."""
 
+import dataclasses
 import math
 
 import jax.numpy as jnp
@@ -8,7 +9,7 @@ import pytest
 
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.report._missing import _graded
+from jaxcam.discrepancy.report._missing import _errors, _graded, _level, _words
 from jaxcam.discrepancy.search import occam, roughness
 from jaxcam.discrepancy.terms import (
     Factor,
@@ -250,3 +251,22 @@ def test_families_have_one_place_each_and_different_names():
     )  # fmt: skip
     assert {one.where for one in free} == {Where.FLIGHT, Where.SENSOR}
     assert all(one.argument is not Variable.PHASE for one in free)
+
+
+def test_an_undetermined_straight_line_has_no_part_in_the_error():
+    """A constant and a slope that the rig represents as well are known to 1, a sine to
+    0.01: so is its largest difference from a straight line."""
+    family = Family(Where.FLIGHT, Variable.VELOCITY, -1.0, 1.0)
+    along = np.linspace(-1.0, 1.0, 201)
+    basis = np.stack([np.ones_like(along), along, np.cos(np.pi * along)], axis=1)
+    covariance = np.diag([1.0, 1.0, 1e-4])
+    value = basis @ np.array([3.0, -2.0, 0.5])
+    level = _errors(_level(family, along, basis), covariance)
+    assert np.max(_errors(basis, covariance)) > 1.0
+    assert np.max(level) == pytest.approx(0.01, rel=0.02)
+    words = _words(family, "force", along, value, level)
+    assert "differs most from a straight line at velocity" in words
+    # a function of time or phase may contain a slope
+    timed = dataclasses.replace(family, argument=Variable.TIME)
+    slope = _level(timed, along, basis)[:, 1]
+    np.testing.assert_allclose(slope, along, atol=1e-12)

@@ -76,3 +76,10 @@ def test_a_diverging_motion_has_no_information():
     for wrong in (np.inf, np.nan, 1e200):
         assert not _usable(one * wrong, one[0])
         assert not _usable(one, one[0] * wrong)
+
+
+def test_information_that_is_not_positive_is_a_numerical_error():
+    """Eigenvalues 3 and -1; a negative one of 1e-9 is a rounding error."""
+    score = np.ones(2)
+    assert not _usable(np.array([[1.0, 2.0], [2.0, 1.0]]), score)
+    assert _usable(np.array([[1.0, 0.0], [0.0, -1e-9]]), score)

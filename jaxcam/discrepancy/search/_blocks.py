@@ -19,6 +19,11 @@ from ...fitting.engine import (
 )
 
 
+# Negative eigenvalue of an information matrix, relative to the largest one, that may be
+# a rounding error
+_ROUNDING = 1e-6
+
+
 @dataclasses.dataclass(frozen=True)
 class Blocks:
     """The likelihood about a point as a quadratic function, block by block.
@@ -106,10 +111,15 @@ def blocks_of(
     )
 
 
-def _usable(*arrays: np.ndarray) -> bool:
-    """Return whether products of the numbers in arrays neither overflow nor are NaN."""
+def _usable(information: np.ndarray, score: np.ndarray) -> bool:
+    """Return whether the numbers are finite, even in products, and the information is
+    positive semidefinite, except for rounding errors.
+    """
     most = np.cbrt(np.finfo(float).max)
-    return all(bool(np.all(np.abs(one) < most)) for one in arrays)
+    if not all(bool(np.all(np.abs(one) < most)) for one in (information, score)):
+        return False
+    least, *_, largest = np.linalg.eigvalsh(information)[[0, -1]]
+    return bool(least >= -_ROUNDING * largest)
 
 
 def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
