@@ -6,6 +6,7 @@ from typing import Any, cast
 import pytest
 
 from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search._clock import Clock
 from jaxcam.discrepancy.search._element_need import ElementNeed
 from jaxcam.discrepancy.search._free_fits import FreeFits, Missing
 from jaxcam.fitting import Problem
@@ -76,3 +77,10 @@ def test_an_element_that_is_no_candidate_promises_nothing():
     need.compare(_PROBLEM, _FIT, [], _LEAST)
     assert not need.preferred
     assert not need.remains(_PROBLEM, None, _LEAST)
+
+
+def test_a_limit_of_time_is_noticed_only_if_a_candidate_is_left_out():
+    long, short = Clock(1.0), Clock(-1.0)
+    assert not long.over and not long.stopped
+    assert not short.stopped
+    assert short.over and short.stopped

@@ -57,3 +57,9 @@ def test_the_command_says_it_in_one_line(tmp_path):
     assert ending.exit_code == 2
     assert "no recording" in ending.output
     assert "Traceback" not in ending.output
+
+
+def test_a_search_needs_time():
+    ending = CliRunner().invoke(app, ["diagnose", "demo", "--minutes", "0"])
+    assert ending.exit_code == 2
+    assert "`minutes` is 0" in ending.output

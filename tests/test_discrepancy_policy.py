@@ -123,6 +123,8 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_ALIKE",
         # below which a negative eigenvalue is a rounding error
         "_ROUNDING",
+        # above which the derivatives of a piece diverge
+        "_DIVERGED",
         # when joints that allow for model errors are consistent with the samples
         "_CONSISTENT",
         # how Newton steps for states of held-out data are shortened

@@ -237,3 +237,16 @@ def test_the_extended_library_is_chosen_by_a_word():
         for candidates in (None, "extended")
     )
     assert few < many and "stop_above" in many - few
+
+
+@pytest.mark.slow
+def test_a_search_whose_time_is_over_says_so():
+    """Without any time, no candidate is tried; the misfit is still reported."""
+    found = _diagnosed(
+        [_sailing(0.3, 0.3), _sailing(0.2, 0.3)],
+        candidates=[Sail()],
+        policy=Policy(minutes=1e-9),
+    )
+    assert found.verdict is Verdict.UNKNOWN and not found.names
+    assert Reason.TIME in {caveat.reason for caveat in found.caveats}
+    assert found.left_before

@@ -33,6 +33,13 @@ def diagnose(
             "--extended", help="Also try the terms of the extended library (slower)."
         ),
     ] = False,
+    minutes: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MIN",
+            help="Time (min) after which no further candidate is tried. Default: 20.",
+        ),
+    ] = None,
     resume: Resume = False,
     json_file: Annotated[
         Path | None,
@@ -46,7 +53,7 @@ def diagnose(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help=("Write verdict.json, model.json and index.html to DIR."),
+            help="Write verdict.json, model.json and index.html to DIR.",
         ),
     ] = None,
 ) -> None:
@@ -74,6 +81,7 @@ def diagnose(
     from ._output import Output
     from ._progress import progress
 
+    policy = _policy(minutes)
     keep_compiled_programs()
     runs, nominal = read(case, rig, files, system)
     if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
@@ -94,6 +102,7 @@ def diagnose(
             seed=seed,
             progress=report,
             keep=keep,
+            policy=policy,
         )
         figures = []
         if out is not None:
@@ -104,6 +113,12 @@ def diagnose(
             write_verdict(out, found, figures, notes, outlook)
     _print(output, found, notes, outlook)
     output.write_json({**found.to_json(), **outlook.data()})
+
+
+def _policy(minutes: float | None):
+    from ..discrepancy import Policy
+
+    return Policy() if minutes is None else Policy(minutes=minutes)
 
 
 def _kept_fits(out: Path | None, resume: bool) -> Path | None:

@@ -289,6 +289,7 @@ def _without_a_name(
             trials.progress,
             bare,
             elements,
+            trials.clock,
         )
         return search, *_needed(search, search.run(), best.bic, seed)
 
@@ -296,7 +297,7 @@ def _without_a_name(
     always = policy.elements > 1
     results = [searched(always)]
     first, found, _ = results[0]
-    if not always and first.lacks_element(found):
+    if not always and first.lacks_element(found) and not trials.clock.over:
         results.append(searched(True))
         second, found, _ = results[-1]
         if first.need.preferred and second.falls_short(found):

@@ -27,6 +27,7 @@ class Reason(enum.StrEnum):
     BEYOND_TOLERANCE = "beyond tolerance"
     NOISIER = "noisier than stated"
     MODEL_ERROR = "errors of the model"
+    TIME = "time is over"
     SET_ASIDE = "record set aside"
 
 
@@ -156,6 +157,17 @@ def model_errors(question: Question, choice: Choice) -> Iterator[Caveat]:
             "Fitted to complete flights, the textbook model has an rms residual of "
             f"{quantity(f'{whole.before:.3g}', unit)} and the chosen model one of "
             f"{quantity(f'{whole.after:.3g}', unit)}.",
+        )
+
+
+def out_of_time(trials: Trials) -> Iterator[Caveat]:
+    """Return the caveat that candidates were left out because the time was over."""
+    if trials.clock.stopped:
+        yield Caveat(
+            Reason.TIME,
+            f"The search was ended after {trials.policy.minutes:.3g} minutes: not all "
+            "candidates were tried. To allow more time, set `minutes` of the policy "
+            "(`--minutes` on the command line).",
         )
 
 

@@ -34,6 +34,7 @@ from ._caveats import (
     may_differ,
     model_errors,
     noisier_than_stated,
+    out_of_time,
     small_remainder,
 )
 from ._close_forms import close_forms
@@ -71,7 +72,7 @@ def diagnosis_of(
         effects.insert(0, unknown_effect(trials, choice, divided.left))
     others = fitted_alternatives(trials, choice)[: policy.alternatives]
     ties = [trial for trial in others if abs(trial.bic - best.bic) < policy.tie]
-    caveats += [*noisier_than_stated(question), *model_errors(question, choice)]
+    caveats += _of_search(question, trials, choice)
     caveats += caveats_of(trials, choice, ties, bool(effects))
     model = question.problem.model
     floor = float(model.sensors[watching(model)].floor)
@@ -178,8 +179,7 @@ def _of_functions(
         {},
         {},
         (
-            *noisier_than_stated(question),
-            *model_errors(question, choice),
+            *_of_search(question, trials, choice),
             *_doubts_of(choice, missing, policy),
         ),
         policy,
@@ -187,6 +187,13 @@ def _of_functions(
         misfit_by_part(bare.fit, policy),
         choice.differing,
     )
+
+
+def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[Caveat]:
+    """Return caveats on the conditions of the search, whatever it found."""
+    yield from noisier_than_stated(question)
+    yield from model_errors(question, choice)
+    yield from out_of_time(trials)
 
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:

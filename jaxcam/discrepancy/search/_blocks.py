@@ -16,12 +16,16 @@ from ...fitting.engine import (
     off_nominal,
     Point,
     prior_information,
+    Weights,
 )
 
 
 # Negative eigenvalue of an information matrix, relative to the largest one, that may be
 # a rounding error
 _ROUNDING = 1e-6
+# Information on the state of a piece, relative to the median, above which its
+# derivatives diverge
+_DIVERGED = 1e6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,15 +76,7 @@ def blocks_of(
     size = len(columns.scale)
     record, start, information, score = [], [], [], []
     for a, b in zip(edges, edges[1:]):
-        weights = problem.between(a, b)
-        found, _ = assemble(
-            problem.layout,
-            problem.pieces,
-            problem.weighted(weights),
-            point,
-            local,
-            scales,
-        )
+        found = _assembled(problem, problem.between(a, b), point, local, scales)
         found = jax.tree.map(np.asarray, eliminate_states(found))
         for r, (name, place) in enumerate(zip(problem.records, columns.place)):
             # a parameter with separate values has a row for each recording
@@ -109,6 +105,30 @@ def blocks_of(
         pull,
         np.maximum(columns.record, 0),
     )
+
+
+def _assembled(problem: Problem, weights: Weights, point: Point, local, scales):
+    """Return the normal equations of the pieces, without those whose derivatives
+    diverge.
+
+    Dry friction that is larger than expected makes the steps of a piece unstable: its
+    motion remains bounded, but its derivatives do not.
+    """
+
+    def equations(weights):
+        extras = problem.weighted(weights)
+        given = problem.layout, problem.pieces, extras, point, local, scales
+        return assemble(*given)[0]
+
+    found = equations(weights)
+    size = np.max(np.abs(np.asarray(found.ss)), axis=(-2, -1))
+    counts = weights.flown > 0
+    if not np.any(counts):
+        return found
+    wild = counts & ~(size < _DIVERGED * np.median(size[counts]))
+    if not np.any(wild):
+        return found
+    return equations(Weights(np.where(wild, 0.0, weights.flown), weights.rested))
 
 
 def _usable(information: np.ndarray, score: np.ndarray) -> bool:

@@ -48,13 +48,13 @@ class ElementNeed:
         **Arguments:** a fit with functions that leaves a residual, and the gain that an
         element must add to it.
         """
-        if self.comparable or found is None:
+        if found is None:
             return self.comparable
         heat = heat_of(found.fit)
-        if heat > self.policy.near:
-            left = (found.fit.cost - found.fit.problem.samples) / heat
-            least = max(least, self.policy.explains * left)
-        return self._promised(problem, found) > least
+        if heat <= self.policy.near:
+            return self.comparable or self._promised(problem, found) > least
+        left = (found.fit.cost - found.fit.problem.samples) / heat
+        return self._promised(problem, found) > max(least, self.policy.explains * left)
 
     def _promised(self, problem: Problem, found: Missing) -> float:
         """Return the largest predicted gain of an element, minus the penalty for its

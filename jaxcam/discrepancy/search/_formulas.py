@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from ...fitting import Problem
+from ._clock import Clock
 from ._curve_likelihood import CurveLikelihood, promising, Start
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._hidden_state import Hidden
@@ -20,12 +21,12 @@ from ._sums_of_forms import SumSearch
 
 
 def formulated(
-    fits: FreeFits, found: Missing, apart: Problem, small: float, progress
+    fits: FreeFits, found: Missing, apart: Problem, small: float, progress, clock: Clock
 ) -> tuple[Missing, list[Missing]]:
     """Replace the functions of a fit by forms that have about as much evidence.
 
     **Arguments:** `apart`: the problem with disconnected pieces. `small`: the tolerated
-    increase in cost.
+    increase in cost. `clock`: the limit of the time.
 
     **Returns:** the fit, and all fits with forms.
     """
@@ -33,10 +34,10 @@ def formulated(
     for slot in [one.slot for one in found.functions]:
         # the function may have changed while another one was replaced
         one = _in_slot(found, slot)
-        if isinstance(one, Hidden) or not one.smooth:
+        if isinstance(one, Hidden) or not one.smooth or clock.over:
             continue
         likelihood = CurveLikelihood.about(fits, found, one)
-        trials = _Trials(fits, found, apart, one, small, progress)
+        trials = _Trials(fits, found, apart, one, small, progress, clock)
         trials.run(promising(likelihood, fits.policy.followed))
         if trials.kept is None and not trials.close:
             search = SumSearch(likelihood, fits.policy.small)
@@ -61,7 +62,9 @@ class _Trials:
         one: Free,
         small: float,
         progress,
+        clock: Clock,
     ):
+        self.clock = clock
         self.fits, self.found, self.apart = fits, found, apart
         self.one, self.small, self.progress = one, small, progress
         self.sound: list[Missing] = []
@@ -88,7 +91,7 @@ class _Trials:
         which has one parameter fewer.
         """
         waiting, done, least = list(waiting), set(), -math.inf
-        while waiting:
+        while waiting and not self.clock.over:
             start = waiting.pop(0)
             gain, form, _ = start
             if gain < least:

@@ -14,6 +14,7 @@ from ...fitting import Problem
 from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
+from ._clock import Clock
 from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
 from ._free_fits import FreeFits, heat_of, Missing, Subset
@@ -38,7 +39,8 @@ class FreeSearch:
 
     **Arguments:** the problem, names of the rig parameters, candidate terms, families
     of functions, the policy, `progress(sentence, fraction)`, the cost of the model
-    without any of them, and whether elements with an internal state are candidates.
+    without any of them, whether elements with an internal state are candidates, and the
+    clock that limits the time.
     """
 
     def __init__(
@@ -51,8 +53,9 @@ class FreeSearch:
         progress: Callable[[str, float | None], None],
         cost: float,
         elements: bool = False,
+        clock: Clock | None = None,
     ):
-        self.cost = cost
+        self.cost, self.clock = cost, clock or Clock(policy.minutes)
         self.policy, self.progress = policy, progress
         self.terms = [t for t in terms if not any(s.inner for s in t.strengths())]
         self.fits = FreeFits(rig, self.terms, policy)
@@ -108,7 +111,7 @@ class FreeSearch:
         # a form may score a little worse than its curve: the better score counts
         best = min(curve.score, found.score)
         for lead in self._others():
-            if leaves_noise(self.fits, found, self._small(found)):
+            if leaves_noise(self.fits, found, self._small(found)) or self.clock.over:
                 break
             curve = self._rival_function(bare, lead)
             if curve is None:
@@ -137,7 +140,9 @@ class FreeSearch:
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
         small = self._small(found)
-        found, forms = formulated(self.fits, found, self.apart, small, self.progress)
+        found, forms = formulated(
+            self.fits, found, self.apart, small, self.progress, self.clock
+        )
         self.tried += forms
         return found
 
@@ -207,7 +212,7 @@ class FreeSearch:
                     break
             best = found
             for lead in leads:
-                if self._done(best, lead, leads[0]):
+                if self._done(best, lead, leads[0]) or self.clock.over:
                     break
                 said = lead.label.replace("_", " ")
                 self.progress(f"fitting {said}", None)

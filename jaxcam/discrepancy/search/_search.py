@@ -32,6 +32,8 @@ class Search:
             most = len(self.trials.terms) if size == 1 else self.policy.tried
             order = sorted(promised, key=lambda n: promised[n][0])[:most]
             for k, names in enumerate(order):
+                if self.trials.clock.over:
+                    break
                 said = " and ".join(sorted(names)).replace("_", " ")
                 self.trials.progress(f"fitting {said}", k / len(order))
                 start = promised[names][1]

@@ -12,6 +12,7 @@ from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Term
 from ._blocks import Blocks, blocks_of
+from ._clock import Clock
 from ._gains import predicted_gain
 from ._given_up import given_up
 from ._kept_trials import Ended, KeptTrials
@@ -37,8 +38,8 @@ class Trials:
     """All fits of one problem, and the predictions from them.
 
     **Arguments:** the problem, the names of the rig parameters (free in every fit), the
-    candidate terms, `progress(sentence, fraction)`, and the store of fits for an
-    interrupted run.
+    candidate terms, the policy, `progress(sentence, fraction)`, the store of fits for
+    an interrupted run, and the clock that limits the time.
     """
 
     def __init__(
@@ -49,9 +50,11 @@ class Trials:
         policy: Policy,
         progress: Callable[[str, float | None], None],
         kept: KeptTrials | None = None,
+        clock: Clock | None = None,
     ):
         self.problem, self.rig, self.terms = problem, tuple(rig), tuple(terms)
         self.policy, self.progress = policy, progress
+        self.clock = clock or Clock(policy.minutes)
         # the best fit of each subset
         self.known: dict[frozenset[str], Trial] = {}
         self._kept = kept

@@ -1,0 +1,25 @@
+"""Limit the time of a search."""
+
+import time
+
+
+class Clock:
+    """The time that a search may take, from now on.
+
+    When it is over, no further candidate is tried, and the best explanation found so
+    far is assessed.
+
+    **Arguments:** the time in minutes.
+    """
+
+    def __init__(self, minutes: float):
+        self._end = time.monotonic() + 60 * minutes
+        # whether a candidate was left out because the time was over
+        self.stopped = False
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is over; a caller who asks then leaves a candidate out."""
+        if time.monotonic() > self._end:
+            self.stopped = True
+        return self.stopped
