@@ -81,7 +81,6 @@ def diagnose(
     from ._output import Output
     from ._progress import progress
 
-    policy = _policy(minutes)
     keep_compiled_programs()
     runs, nominal = read(case, rig, files, system)
     if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
@@ -102,7 +101,7 @@ def diagnose(
             seed=seed,
             progress=report,
             keep=keep,
-            policy=policy,
+            policy=_policy(minutes),
         )
         figures = []
         if out is not None:
