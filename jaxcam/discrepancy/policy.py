@@ -205,6 +205,11 @@ class Policy:
     elements: int = bounds(
         1, "use of elements with internal states; 0: never, 1: if needed, 2: always"
     )
+    little: float = bounds(
+        0.1,
+        "if model errors are allowed for, fraction of the misfit below which a "
+        "residual is not worth an element with an internal state",
+    )
     function_lengths: tuple[float, ...] = bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
         "correlation lengths of a free function, as fractions of the range of its "

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from scipy.stats import chi2
 
 from ...fitting import Problem
-from ...fitting.engine import Point, separated
+from ...fitting.engine import already_loose, Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
 from ._clock import Clock
@@ -173,10 +173,14 @@ class FreeSearch:
         """Return whether to repeat the search with elements among the candidates.
 
         This is so if an element is preferred to every function, or if it may explain
-        a residual that the functions leave.
+        a residual that the functions leave. If model errors are allowed for, a residual
+        always remains, and elements are tried only if the functions explain little.
         """
         if self.need.preferred or not self.falls_short(found):
             return self.need.preferred
+        if found is not None and already_loose(self.problem.extras):
+            if found.fit.cost < self.policy.little * self.cost:
+                return False
         least = self._least()
         if found is not None:
             least = max(least, self._small(found) / heat_of(found.fit))
