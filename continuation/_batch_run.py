@@ -17,7 +17,8 @@ from .step_control import measure_step
 
 
 _RUNNING, _BOUND, _SHORT, _FULL, _NO_START = range(5)
-# number of attempted steps per call, with and without reports of progress
+# maximum number of attempted steps per call of `_advance`, with and without progress
+# reports
 _ROUNDS, _WHOLE = 16, np.iinfo(np.int64).max
 REASONS = (
     "running",
@@ -30,7 +31,7 @@ REASONS = (
 
 
 class Lane(NamedTuple):
-    """One branch of the batch during the run."""
+    """The state of one branch of the batch during the run."""
 
     at: Corrected
     step: jax.Array
@@ -43,15 +44,17 @@ class Axes(eqx.Module):
     """A static record of which parameters differ between branches."""
 
     tree: PyTree = eqx.field(static=True)
-    """0 for each leaf that differs, None for each shared leaf."""
+    """For each leaf of the parameters, 0 (the axis of the branches) if its value
+    differs between branches, otherwise None.
+    """
 
     @staticmethod
     def of(one: PyTree, given: PyTree, lanes: int) -> "Axes":
-        """Return the axes, given the parameters of one branch and those of all
-        branches.
+        """Return the record for `given`, the parameters of all branches; `one` contains
+        the parameters of a single branch.
 
         Raises:
-            ValueError: The number of values is wrong.
+            ValueError: The number of values of a leaf is not the number of branches.
         """
         axes = jax.tree.map(
             lambda a, b: 0 if np.ndim(b) == np.ndim(a) + 1 else None, one, given
@@ -67,11 +70,11 @@ class Axes(eqx.Module):
 
     @property
     def leaves(self) -> list:
-        """Return the values in the order of the parameters' leaves."""
+        """Return 0 or None for each leaf of the parameters, in order."""
         return jax.tree.leaves(self.tree, is_leaf=lambda x: x is None)
 
     def of_lane(self, given: PyTree, index: int) -> PyTree:
-        """Return the parameters of one branch."""
+        """Return the parameters of one branch, given those of all branches."""
         flat, structure = jax.tree.flatten(given)
         chosen = [
             x[index] if axis == 0 else x
@@ -92,7 +95,7 @@ def follow_lanes(
     `points`; and `progress`, which is called with the completed fraction, or None.
 
     Returns:
-        The last `Lane` of each branch.
+        The final `Lane` of each branch.
     """
     lanes = _begin(problem, given, axes, leaf, z, signs, low, high, s, points)
     rounds = np.asarray(_WHOLE if progress is None else _ROUNDS)
@@ -109,7 +112,7 @@ def follow_lanes(
 
 @program
 def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
-    """Return the first point of each branch."""
+    """Return the `Lane` of each branch at its first point."""
     width = high - low
 
     def begin(parameters, z, sign):
@@ -119,7 +122,7 @@ def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
         turn = jnp.where(at.tangent[-1] * sign < 0, -1.0, 1.0)
         tangent = turn * at.tangent
         at = with_field(at, "tangent", tangent)
-        # the determinant of the Jacobian and the tangent changes sign with the tangent
+        # the determinant of the Jacobian bordered by the tangent changes sign with it
         at = with_field(at, "determinant", turn * at.determinant)
         buffer = jax.tree.map(
             lambda x: jnp.zeros((points, *x.shape), x.dtype).at[0].set(x), at

@@ -11,25 +11,27 @@ from .problem import AbstractProblem
 
 # maximum number of times that the step is shortened because the parameter turns back
 _TURNED = 12
-# smallest parameter component of a unit tangent whose sign is reliable
+# below this, the sign of the parameter component of a unit tangent is unreliable
 _SIDEWAYS = 1e-3
 
 
 def solved_start(
     problem: AbstractProblem, context: Context, z: np.ndarray, name: str, direction: int
 ) -> Corrected:
-    """Solve the problem at the initial parameter, and find the direction there."""
+    """Return the solution at the initial parameter, with its tangent in the requested
+    direction.
+    """
     across = np.zeros_like(z)
     across[-1] = 1.0
     at = correct(problem, context, z, across, across)
     if not at.success:
-        # more iterations need another program, which is compiled only on demand
+        # a larger number of iterations needs another program: compile it only if needed
         settings = with_field(context.settings, "max_iterations", 30)
         patient = context._replace(settings=settings)
         at = correct(problem, patient, z, across, across)
     if not at.success:
-        # Newton's method fails if the derivative is singular, but the start may be a
-        # solution
+        # Newton's method fails if the derivative is singular, but the start itself may
+        # be a solution
         given = evaluate(problem, context, z, across)
         size = np.abs(_residual(problem, z, context.leaf)) / given.scale[:-1]
         if not np.all(size <= context.settings.tolerance):
@@ -50,7 +52,7 @@ def leave(
     step: float,
 ) -> tuple[Corrected, float]:
     """Return the first point of a branch that leaves z along a tangent, and its
-    distance, at most `step`.
+    distance from z, which is at most `step`.
 
     The step is shortened if the parameter turns back within it, because the values of
     the test functions at z, which would reveal the fold, are not known.
@@ -67,7 +69,7 @@ def leave(
         at = correct(problem, context, guess, tangent / scale**2, tangent)
         moved = np.linalg.norm((at.z - guess) / scale)
         if at.success and moved <= step and low <= at.z[-1] <= high:
-            # the tangent has changed direction since the start: continue outwards
+            # the tangent here differs from that at z: orient it away from z
             outwards = evaluate(problem, context, at.z, at.z - z)
             if np.all(np.isfinite(outwards.tangent)):
                 onwards = [at.z[-1] - z[-1]]

@@ -47,7 +47,7 @@ def branch(
         callbacks: Called with each point as it is found, for example to show progress
             or to save it. If a callback returns True, the branch ends.
         out: A file to which each point is appended, for [`continuation.load_branch`][];
-            for `"both"`, the first direction has its own file (`.back` in the name).
+            for `"both"`, the part towards smaller parameters has its own `.back` file.
         resume: Whether to continue an interrupted call from the points in `out`. The
             result is identical to that of an uninterrupted call.
 
@@ -94,7 +94,7 @@ def branch(
             points.append(point)
             if save is not None:
                 save(point)
-            # every callback sees the point
+            # call every callback, even if one of them ends the branch
             if any([callback(point) is True for callback in stop]):
                 break
         return points
@@ -130,7 +130,7 @@ def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:
             "the same, or write to another file"
         )
     points = list(branch.points)
-    # special points after it are found again
+    # special points after the last regular point are found again
     while points and points[-1].special:
         points.pop()
     return points

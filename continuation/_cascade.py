@@ -18,8 +18,8 @@ from .problem import AbstractProblem, Start
 from .special import FLIP
 
 
-# minimum number of regular points on a branch of the cascade whose length is that of
-# the branch before, divided by 2.5 (Feigenbaum's constant of the state)
+# minimum number of regular points on a branch of the cascade, if it is shorter than the
+# branch before by the factor 2.5 (Feigenbaum's constant of the state)
 _POINTS = 10
 
 
@@ -66,7 +66,7 @@ def cascade(
     direction: int = 1,
     callbacks: Iterable[Callable[[Point], Any]] = (),
 ) -> Cascade:
-    """Follow a branch to its flip, the doubled branch to its own flip, and so on.
+    """Follow a branch to its flip, the period-doubled branch to its flip, and so on.
 
     Step lengths decrease with the lengths of the branches.
 
@@ -120,8 +120,8 @@ def cascade(
             break
         (start,) = emanating(last, where, bounds[1] - bounds[0])
         problem = start.problem
-        # doubled branches are shorter, by about 2.5 in the state and 4.7 in the
-        # parameter
+        # each period-doubled branch is shorter than the one before, by a factor of
+        # about 2.5 in the state and 4.7 in the parameter
         longest = last.arclength / 2.5 / _POINTS if len(branches) > 1 else np.inf
         longest = max(min(walk.max_step, longest), 4 * walk.min_step)
         first = min(walk.step, longest / 4)

@@ -12,14 +12,15 @@ from .problem import AbstractProblem
 from .special import cubic_between
 
 
-# the branch meets an earlier point if the distance from it, in step lengths, is at most
+# the branch meets an earlier point if the scaled distance from that point is at most
 # `_MISS` times the tolerance, limited to the range from `_LEAST` to `_MOST`; this
 # allows for the errors of both points, and for digits lost near a branch point, where
 # the equations are nearly singular
 _MISS, _LEAST, _MOST = 1e3, 1e-8, 1e-5
 # number of steps that must lie between a point and the return to it
 _AWAY = 3.0
-# minimum cosine of the angle between the directions in which a point is passed twice
+# minimum cosine of the angle between the two directions in which the branch passes the
+# same point
 _ALIGNED = 0.9
 
 
@@ -57,8 +58,8 @@ class Past:
     def near(
         self, current: Solution, following: Solution
     ) -> list[tuple[float, Passed]]:
-        """Return the points near the step, and the fraction of the step at which each
-        lies.
+        """Return the earlier points near this step, each after the fraction of the
+        step at which it lies.
         """
         representation = current.problem.representation
         known = self.families.get(representation.family, [])
@@ -85,7 +86,8 @@ class Past:
 def closed(
     context: Context, past: Past, current: Solution, following: Solution
 ) -> tuple[Solution, str] | None:
-    """Return the earlier point to which this step has returned, and why the run ends.
+    """Return the earlier point to which this step returns, and why the run ends there;
+    None if the step does not return to an earlier point.
 
     A solution at which the equations are regular lies on only one branch. If a branch
     meets one of its points again, it is therefore a closed curve, or the same curve
@@ -122,8 +124,8 @@ def _cosine_where_met(
     share: float,
     passed: Passed,
 ) -> float | None:
-    """Return the cosine of the angle between the two directions; None if the point is
-    missed.
+    """Return the cosine of the angle between the tangent of this step and that of the
+    earlier point; None if the step misses the point, or the tangents are not aligned.
     """
     scale = current.at.scale
     chord = (following.at.z - current.at.z) / scale

@@ -28,7 +28,7 @@ from .special import (
 )
 
 
-# `parameters` is a property, which type checkers interpret as an argument
+# `parameters` is a property, but type checkers take it for a constructor argument
 _monitored: Any = MonitorPoints
 # a monitor below this, relative to one plus the largest unknown, counts as zero
 _ZERO = 1e-7
@@ -58,9 +58,9 @@ def extended(
         k for k, monitor in problem.monitors().items() if monitor.kind == point.kind
     ]
     if len(same) > 1:
-        # several monitors may have the same kind: choose the monitor that is zero here,
-        # and the last one if several are zero, such as the gap next to an impact of
-        # zero speed
+        # several monitors may have the same kind: choose the one that is zero here; if
+        # several are zero, such as the speed of a grazing impact and the gap of the
+        # flight next to it, choose the last
         at = evaluate(problem, context, z, np.ones_like(z))
         sizes = {k: abs(float(at.monitors[k])) for k in same}
         most = max(min(sizes.values()), _ZERO * (1.0 + float(np.max(np.abs(z)))))

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def eigenvalues_of(matrix: np.ndarray) -> Any:
-    """Compute eigenvalues, largest modulus first; NaN if the matrix is not finite."""
+    """Return eigenvalues, largest modulus first; NaN if the matrix is not finite."""
     if not np.all(np.isfinite(matrix)):
         return np.full(matrix.shape[0], np.nan, complex)
     values: Any = np.linalg.eigvals(matrix).astype(complex)

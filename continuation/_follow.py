@@ -99,7 +99,7 @@ def checked_bounds(bounds: tuple[float, float], name: str) -> tuple[float, float
 
 
 def _begun(problem: AbstractProblem, start: Any) -> tuple[AbstractProblem, Any]:
-    """Return the first problem and its start."""
+    """Return the problem with which the branch starts, and its start."""
     if isinstance(start, Start):
         return start.problem, start
     if isinstance(start, Point):

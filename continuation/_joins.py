@@ -5,8 +5,9 @@ from ._solution import Solution
 from .special import BRANCH_POINT
 
 
-# an orbit has half the period if its halves differ by less than this, in step lengths;
-# the difference grows as the square root of the change of the parameter
+# an orbit has half the period if its halves differ by less than this, measured like the
+# length of a step; close to the flip, the difference grows as the square root of the
+# change of the parameter
 HALF = 1e-4
 JOINS = (
     "the branch rejoins the orbits of half the period at their flip; beyond it, the "

@@ -75,7 +75,7 @@ class LimitCycle(AbstractProblem):
         self.normal, self.basis = _plane(np.asarray(normal))
 
     def _turn(self, u, parameters):
-        """Return the state after the period, and the largest error of a step."""
+        """Return the state after one period, and the largest error of a step."""
         x, period = u[:-1], u[-1]
         _, states, errors = fixed_steps(
             DOPRI8,
@@ -109,11 +109,11 @@ class LimitCycle(AbstractProblem):
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "LimitCycle":
         x = np.asarray(u[:-1], float)
         f = np.asarray(self.vector_field(jnp.asarray(x), parameters))
-        # near a Hopf point, the field vanishes: keep the plane that was derived there
+        # the field vanishes near a Hopf point: keep the plane derived at that point
         if np.linalg.norm(f) < 1e-6 * max(1.0, float(np.linalg.norm(x))):
             return self
         normal, basis = _plane(f)
-        # the sign is kept continuous for the test functions
+        # keep the sign of the normal, so that the test functions are continuous
         normal = normal * (-1.0 if normal @ np.asarray(self.normal) < 0 else 1.0)
         moved = with_field(with_field(self, "normal", normal), "basis", basis)
         return with_field(moved, "reference", x)
@@ -160,7 +160,9 @@ def _plane(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def cycle_at_hopf(
     vector_field: Callable, parameters: PyTree, point: Any, matrix: np.ndarray
 ) -> Start | None:
-    """Return the cycle that emerges at a Hopf point: radius 0, period 2 pi / omega."""
+    """Return the start of the branch of cycles that emerges at a Hopf point, with
+    radius 0 and period 2 pi / omega; None if the matrix has no complex eigenvalues.
+    """
     found = np.linalg.eig(matrix)
     values: Any = found.eigenvalues
     vectors: Any = found.eigenvectors
@@ -169,7 +171,7 @@ def cycle_at_hopf(
         return None
     k = int(np.argmin(np.where(upper, np.abs(values.real), np.inf)))
     q = vectors[:, k]
-    # the phase for which the real and imaginary parts are orthogonal
+    # choose the phase for which the real and imaginary parts are orthogonal
     q = q * np.exp(-0.5j * np.angle(np.sum(q * q)))
     problem = LimitCycle(vector_field, parameters, point.state, normal=q.imag)
     state = np.append(point.state, 2 * np.pi / values[k].imag)

@@ -16,7 +16,7 @@ def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
     Raises:
         ValueError: `where` selects nothing, or not a single number.
     """
-    # bifurcation problems are often written with whole numbers
+    # parameters of bifurcation problems are often given as integers
     picked = parameter_pick(where, parameters, integers=True)
     if picked.several:
         raise ValueError(
@@ -27,8 +27,8 @@ def pick_one(where: Where, parameters: PyTree) -> tuple[int, str]:
 
 
 def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
-    """Convert floats and the selected leaves to float64 arrays, which are program
-    arguments.
+    """Return the parameters with floats and the selected leaves as float64 arrays, so
+    that they become arguments of compiled programs instead of constants.
     """
     flat, structure = jax.tree.flatten(parameters)
     for i, leaf in enumerate(flat):

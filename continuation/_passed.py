@@ -18,7 +18,7 @@ from .special import (
 
 
 class Special(NamedTuple):
-    """A special point: the solution there, and its data."""
+    """A special point: the solution, its kind, its location and its normal form."""
 
     current: Solution
     kind: str
@@ -27,12 +27,13 @@ class Special(NamedTuple):
     criticality: str
 
 
-# distance of the points on both sides of a special point, relative to the step
+# distance from a special point at which the branch on either side of it is examined,
+# relative to the length of the step
 _BESIDE = 1e-3
 
 
 def _unknowns(problem, context: Context, z: np.ndarray):
-    """Return the unknowns and the parameters of a point."""
+    """Return the unknowns and the parameters at z = (u, parameter)."""
     return z[:-1], with_parameter(problem, context.leaf, z[-1]).parameters
 
 
@@ -48,7 +49,8 @@ def sign_changes(context: Context, current: Solution, following: Solution) -> li
         before = current.tests.get(name, 0.0)
         if name in watched and before * after < 0:
             found.append(name)
-    # branch points and corners first: discontinuous functions also change sign there
+    # put branch points and corners first: discontinuous test functions change sign
+    # there too
     first = {BRANCH_POINT, *corners(current, following)}
     return sorted(found, key=lambda name: name not in first)
 
@@ -98,7 +100,8 @@ def located_between(
 def special_here(
     context: Context, current: Solution, chord: np.ndarray, name: str, located: Located
 ) -> Special | None:
-    """Return the special point; None if it is not reported.
+    """Return the special point at this zero of a test function; None if the zero is not
+    a special point.
 
     `chord` points along the branch at the special point.
     """

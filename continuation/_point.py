@@ -164,7 +164,7 @@ class Branch:
         return self._table().html()
 
     def _table(self) -> ShortTable:
-        """Return the ends and the special points."""
+        """Return a table of the ends and the special points."""
         names = self.names or (self.name,)
         count = f"{len(self.points)} points, {len(self.special)} of them special"
         sentence = f"Branch in {' and '.join(names)}: {count}."
@@ -188,7 +188,7 @@ class Branch:
 
     @property
     def regular(self) -> tuple[Point, ...]:
-        """All other points."""
+        """The points that are not special."""
         return tuple(point for point in self.points if not point.special)
 
     def of_kind(self, kind: str) -> tuple[Point, ...]:
@@ -261,7 +261,7 @@ def set_parameters(problem: Any, parameters: Any) -> Any:
 
 
 def with_field(module: Any, name: str, value: Any) -> Any:
-    """Return a module with one field replaced, as `tree_at` does but ten times
+    """Return a module with one field replaced, as `equinox.tree_at` does, but ten times
     faster.
     """
     new = object.__new__(type(module))

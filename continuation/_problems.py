@@ -129,7 +129,7 @@ class FixedPoint(AbstractProblem):
 
 
 class PeriodicPoints(AbstractRepresentation):
-    """A periodic orbit of a map can be represented by any of its points."""
+    """The representations of a periodic orbit of a map: any of its points."""
 
     family: str = eqx.field(static=True)
     problem: FixedPoint
@@ -156,7 +156,7 @@ class PeriodicPoints(AbstractRepresentation):
 
 @program
 def _mapped(problem: FixedPoint, u, tangent):
-    """Return the next point of an orbit, and the image of a tangent."""
+    """Return the next point of an orbit, and the image of the tangent at that point."""
     return jax.jvp(lambda u: problem.map(u, problem.parameters), (u,), (tangent,))
 
 

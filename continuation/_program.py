@@ -1,4 +1,6 @@
-"""Compile one program for each problem structure."""
+"""Correct points of a branch and evaluate them, with one compiled program for each
+problem structure.
+"""
 
 import dataclasses
 from typing import Any
@@ -41,7 +43,7 @@ class Corrected(eqx.Module):
 
 
 def residual_at(problem: AbstractProblem, leaf: int, z):
-    """Return G at z = (u, parameter)."""
+    """Return the residual G at z = (u, parameter)."""
     parameters = with_leaf(problem.parameters, leaf, z[-1])
     return problem.residual(z[:-1], parameters)
 
@@ -58,7 +60,8 @@ def scale_at(problem: AbstractProblem, leaf: int, z, width):
 
 
 def newton(function, y, tolerance, max_iterations: int):
-    """Find a root of a function; with fewer equations, the nearest one
+    """Return a root of `function`, whether Newton's method converged, and the number of
+    iterations. With fewer equations than unknowns, each correction has the least norm
     (Moore-Penrose).
     """
     solution = optx.root_find(
@@ -76,8 +79,8 @@ def newton(function, y, tolerance, max_iterations: int):
 
 
 def tangent_and_determinant(jacobian, scale, old):
-    """Return the tangent in the direction of `old`, of unit length when scaled, and the
-    determinant (thesis, eq. 3.33).
+    """Return the tangent in the direction of `old`, of unit length when scaled (thesis,
+    eq. 3.33), and the root of the determinant described in `Corrected`.
     """
     scaled = jacobian * scale[None, :]
     old = old / scale
@@ -153,7 +156,7 @@ _correct = program(correct_)
 
 
 def _plain(at: Corrected) -> Corrected:
-    """Convert to NumPy arrays, which are faster on the host."""
+    """Return the same point with NumPy arrays, which are faster on the host."""
     return Corrected(
         **{
             f.name: jax.tree.map(np.asarray, getattr(at, f.name))
@@ -165,8 +168,8 @@ def _plain(at: Corrected) -> Corrected:
 def correct(
     problem, context: Context, guess, normal, old, least_norm=False, given=False
 ):
-    """Call the compiled `correct_` with numbers as arguments; the result has NumPy
-    arrays.
+    """Return the result of the compiled `correct_` as NumPy arrays. Numbers that may
+    change between calls are passed as arrays, so that they are not compiled in.
     """
     padded = problem.padded()
     vectors = [np.asarray(z) for z in (guess, normal, old)]
@@ -226,7 +229,8 @@ def _solve(problem, u, tolerance, max_iterations: int):
 
     def equations(y):
         g = problem.residual(y * scale, problem.parameters)
-        # for square problems, the tolerance is relative to the scale of the unknowns
+        # there are as many equations as unknowns: each equation is divided by the scale
+        # of an unknown, so that the tolerance is relative to these scales
         return g / scale
 
     y, success, iterations = newton(equations, u / scale, tolerance, max_iterations)

@@ -30,7 +30,7 @@ class Recorder:
     """A callback that appends points to a file as they are found.
 
     **Arguments:** `path`: the file; `header`: entries of its first line in addition to
-    the format; `after`: existing points, with which the file is rewritten.
+    the format; `after`: points found earlier, which are written to the new file first.
     """
 
     def __init__(
@@ -166,7 +166,7 @@ def _line(value: Any) -> str:
 
 
 def _number(x: Any) -> Any:
-    """Convert a float to a JSON value."""
+    """Return a float as a JSON value, which is a string if the float is not finite."""
     x = float(x)
     return x if np.isfinite(x) else str(x)
 

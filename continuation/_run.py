@@ -20,14 +20,14 @@ from .special import ahead, Located
 from .step_control import Refusal
 
 
-# longest step around a corner of the branch, relative to the initial one
+# longest step around a corner of the branch, relative to the initial step
 _CORNER = 1e-2
-# number of failures in one place before an end is searched for just ahead
+# number of failed steps from one point before an end of the branch is sought just ahead
 _HALVINGS = 2
 
 
 class Run:
-    """One run along a branch."""
+    """A run that follows a branch from point to point."""
 
     def __init__(self, context: Context, algorithm, name: str, direction: int):
         self.context = context
@@ -50,7 +50,9 @@ class Run:
         kind: str = "start",
         arclength: float = 0.0,
     ) -> Solution:
-        """Find the first solution; add its point to `pending` unless it is known."""
+        """Return the first solution, and add its point to `pending`, unless the branch
+        is resumed.
+        """
         if isinstance(start, Point):
             return self._resumed(problem, start, history)
         p = start.parameter
@@ -95,7 +97,7 @@ class Run:
         problem = with_parameter(problem, context.leaf, z[-1])
         problem = problem.refreshed(z[:-1], problem.parameters)
         at = evaluate(problem, context, z, start.tangent)
-        # bit-identical to the values at the time the point was found
+        # use the stored tangent and scale: the resumed branch must be bit-identical
         at = with_field(at, "tangent", np.asarray(start.tangent))
         at = with_field(at, "scale", np.asarray(start.scale))
         passed = [p for p in history if not p.special and p.label < start.label]
@@ -118,7 +120,7 @@ class Run:
     # Stepping
 
     def points(self, current: Solution) -> Iterator[Point]:
-        """Yield the points from here onwards."""
+        """Yield the pending points, and then the points after `current`."""
         yield from self._flush()
         low, high = self.context.bounds
         outwards = current.at.tangent[-1]
@@ -150,8 +152,8 @@ class Run:
             current = self._with_fresh_references(following)
 
     def _advance(self, current: Solution) -> tuple[Solution | None, str]:
-        """Find the next point, or None if the branch ends before it; also return the
-        reason if the branch ends.
+        """Return the next point, or None if the branch ends before it, and the reason
+        why the branch ends (empty if it continues).
         """
         step, failures = current.step, 0
         while True:
@@ -184,7 +186,7 @@ class Run:
                     if back is not None:
                         return back
                     return following, attempted.bound
-            # a sharp bend does not indicate an end, and a failed long step need not
+            # a sharp bend is no sign of an end, and a failed long step need not be one
             last = step / 2 < self.context.settings.min_step
             failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
@@ -218,7 +220,7 @@ class Run:
             current.arclength + length,
             trail,
         )
-        # an exact zero keeps the previous sign, so that the next step changes it
+        # give an exact zero the previous sign, so that the sign flips in the next step
         for name, value in following.tests.items():
             if value == 0:
                 before = current.tests.get(name, 0.0)
@@ -245,8 +247,8 @@ class Run:
     def _pass_events(
         self, current: Solution, following: Solution, passed: list[tuple[str, Located]]
     ):
-        """Add special points to `pending`; return the continuation if one ends the
-        problem.
+        """Add special points to `pending`; if one of them ends the problem or the
+        branch, return the result of `_advance`, otherwise None.
         """
         chord = following.at.z - current.at.z
         for name, located in passed:
@@ -264,7 +266,7 @@ class Run:
     def _special(
         self, current: Solution, chord, name: str, located: Located
     ) -> tuple[Point, Solution] | None:
-        """Return the special point and its solution; None if it is not reported."""
+        """Return the point and its solution; None if the zero is no special point."""
         special = special_here(self.context, current, chord, name, located)
         if special is None:
             return None
@@ -302,7 +304,7 @@ class Run:
         return None
 
     def _transition(self, current: Solution, point: Point, stood: Solution):
-        """Continue with another problem beyond a point, or end there."""
+        """Return the first solution beyond a point, or None and why the run ends."""
         self.changes.append(point)
         towards = current.at.tangent[-1]
         self.direction = 1 if towards >= 0 else -1
@@ -337,7 +339,7 @@ class Run:
             yield self.pending.pop(0)
 
     def _refusal(self, current: Solution) -> str:
-        """Return why a point is not admissible; empty if it is."""
+        """Return why a point is not admissible; empty if it is admissible."""
         if type(current.problem).check is AbstractProblem.check:
             return ""
         point = self._point(current, "regular")

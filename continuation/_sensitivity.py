@@ -60,8 +60,8 @@ def special_point(
 
 @program
 def _derivatives(problem, u, moving, fixed):
-    """Return the derivative of the solution with respect to each moving leaf, (n+1,
-    leaf...).
+    """Return the derivative of the last unknown, which is the selected parameter, with
+    respect to each leaf of `moving`.
     """
 
     def residual(u, moving):
@@ -107,7 +107,7 @@ def sensitivity(point: Point, where: Where) -> PyTree:
 
 
 def _position(moving: PyTree, parameters: PyTree, leaf: int) -> int:
-    """Return the index of a leaf among the float leaves."""
+    """Return the index of leaf number `leaf` among the float leaves only."""
     del moving
     leaves = jax.tree.leaves(parameters)[:leaf]
     return sum(eqx.is_inexact_array(x) for x in leaves)

@@ -23,9 +23,9 @@ class Solution(NamedTuple):
     step: float
     arclength: float
     trail: tuple
-    """Points passed, oldest first, as states with their tangents."""
+    """The last points before this one, oldest first, each as (z, tangent)."""
     yielded: bool = False
-    """Whether its point has been yielded."""
+    """Whether the point of this solution has already been yielded."""
 
 
 def solution_at(
@@ -80,7 +80,9 @@ def point_of(
 
 
 def stations(current: Solution, wanted: int) -> list[Station]:
-    """Return the last points, at least one, scaled as at the current point."""
+    """Return up to `wanted` of the last points, in the scales of the current point,
+    which is the last of them.
+    """
     scale = current.at.scale
     trail = (*current.trail, (current.at.z, current.at.tangent))[-max(wanted, 1) :]
     return [Station(z / scale, v / scale / np.linalg.norm(v / scale)) for z, v in trail]

@@ -6,12 +6,12 @@ from .problem import AbstractProblem
 
 
 def stated(problem: Any, start: Any) -> tuple[AbstractProblem, Any]:
-    """Return the problem and its start; a system and one of its orbits may be given
-    instead.
+    """Return the problem and its start, which are derived from a system and one of its
+    orbits if these are given instead.
     """
     if isinstance(problem, AbstractProblem):
         return problem, start
-    # the core imports the code for impacts only if a system has impacts
+    # imported here, so that other problems do not load the code for impacts
     from .orbits import start_of
 
     begun = start_of(problem, start)

@@ -19,7 +19,7 @@ class StepAttempt(NamedTuple):
     """The outcome of a step."""
 
     at: Corrected | None
-    """None if the step is rejected."""
+    """The point at the end of the step; None if the step is rejected."""
     bound: str = ""
     """The bound on which the step ends, as a sentence; empty if there is none."""
     following: float = 0.0
@@ -40,7 +40,7 @@ def attempt_step(
     step: float,
     name: str,
 ) -> StepAttempt:
-    """Predict and correct; a step beyond a bound ends on the bound."""
+    """Return the outcome of a step, which ends on a bound if it would cross it."""
     predicted = algorithm.predictor(stations, step) * a.scale
     k, value = _first_bound(problem, context, a.z, predicted)
     if k is None:
@@ -92,7 +92,10 @@ def _judged(
 def _first_bound(
     problem: AbstractProblem, context: Context, z: np.ndarray, target: np.ndarray
 ) -> tuple[int | None, float]:
-    """Return the parameter that leaves its bounds first, and the bound."""
+    """Return the index of the parameter that leaves its bounds first on the way from z
+    to `target`, and the bound that it crosses; the index is None if no bound is
+    crossed.
+    """
     bounds = {z.size - 1: context.bounds}
     if isinstance(problem, AbstractExtended):
         low, high = problem.bounds

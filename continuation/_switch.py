@@ -22,8 +22,9 @@ def emanating(point: Point, where: Where, width: float = 1.0) -> tuple[Start, ..
     """Return the starts of the other branches that emanate from a special point.
 
     From a branch point, these are both halves of the other branch, whose direction
-    solves the algebraic branching equation (thesis, eq. 3.37); from a flip, the doubled
-    orbit; from a Hopf point of a [`continuation.Equilibrium`][], the limit cycle.
+    solves the algebraic branching equation (thesis, eq. 3.37); from a flip, the
+    period-doubled orbit; from a Hopf point of a [`continuation.Equilibrium`][], the
+    limit cycle.
 
     **Arguments:** `width`: width of the parameter bounds, the unit in which changes of
     the parameter are measured.

@@ -54,7 +54,7 @@ def table(
     ]
     for k, head in enumerate(heads):
         cells = [row[k] for row in rows]
-        # a long heading or name may be broken, but a number must not be cut
+        # a long heading or name may be wrapped, but a number must not be
         words = head == "type"
         parts = [part for cell in cells for part in (cell.split() if words else [cell])]
         found.add_column(

@@ -107,7 +107,7 @@ class PolynomialPredictor(AbstractPredictor):
         y = np.stack([station.y for station in used])
         lengths = np.linalg.norm(np.diff(y, axis=0), axis=1)
         s = -np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
-        # y(s) = y0 + s t0 + s^2 q(s), q through the earlier points
+        # y(s) = y0 + s t0 + s^2 q(s), where q interpolates the earlier points
         past = s[:-1]
         if past.size == 0:
             return current.y + step * current.tangent

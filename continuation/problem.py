@@ -312,7 +312,7 @@ class AbstractProblem(eqx.Module):
         """Return the eigenvalues of `at.linearisation`, and a remark on them.
 
         Override this method if the matrix is unbounded at some points, to return the
-        limits there.
+        limits of the eigenvalues at these points.
 
         Args:
             at: The corrector's matrices and values.

@@ -16,8 +16,8 @@ class AbstractRepresentation(eqx.Module):
     """
 
     family: eqx.AbstractVar[str]
-    """Name of the family; problems of one family have the same solutions in the same
-    form.
+    """Name of the family. Two problems belong to the same family if they have the same
+    solutions, described by the same unknowns.
     """
 
     @abc.abstractmethod
@@ -59,12 +59,13 @@ class AbstractRepresentation(eqx.Module):
             parameters: Parameters of the problem.
 
         Returns:
-            The distance in step lengths; None if the problem has no such solutions.
+            The distance, measured like the length of a step; None if the problem has no
+                orbits of half the period.
         """
 
 
 class Unique(AbstractRepresentation):
-    """Each solution has only one representation."""
+    """The representation for problems in which each solution has only one form."""
 
     family: str = eqx.field(static=True)
 

@@ -89,7 +89,7 @@ class EffortAndAngle(AbstractStepControl):
 
 
 def measure_step(a: Any, b: Any, guess: Any) -> StepMeasures:
-    """Measure the step from a to b, corrected from `guess`."""
+    """Return the measures of the step from a to b, which was corrected from `guess`."""
     xp = _namespace(b.z)
     old, new = a.tangent / b.scale, b.tangent / b.scale
     cosine = (old @ new) / (xp.linalg.norm(old) * xp.linalg.norm(new))
@@ -99,5 +99,5 @@ def measure_step(a: Any, b: Any, guess: Any) -> StepMeasures:
 
 
 def _namespace(x: Any) -> Any:
-    """Return NumPy or jax.numpy."""
+    """Return the module for arrays like x: NumPy or jax.numpy."""
     return x.__array_namespace__()

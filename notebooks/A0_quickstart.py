@@ -72,7 +72,7 @@ class TwoMasses(jaxcam.HybridSystem):
         return 2 * jnp.pi / self.frequency
 
 
-# ## Simulate it
+# ## Simulate the system
 
 # +
 system = TwoMasses()

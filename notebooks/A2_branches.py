@@ -40,7 +40,7 @@ assert np.isclose(np.prod(orbit.multipliers).real, 0.8**2, rtol=1e-9)
 stability = variational.stability(system, orbit)
 print(f"test functions: fold {stability.fold:.4f}, flip {stability.flip:.4f}")
 
-# ## The branch as the wall moves
+# ## Follow the branch as the wall moves
 
 branch = continuation.branch(
     system,

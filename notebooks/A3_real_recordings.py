@@ -8,14 +8,14 @@
 
 # # A3. What do textbook models lack? Five public recordings
 #
-# The recordings are of a pendulum, falling balls, a marble that bounces on paper, a
-# positioning stage, and a mounting head that places components. Each has a textbook
-# model of a few lines, and `diagnose` determines what this model lacks. (Notebook A4
-# tests how well the completed models predict another recording in free runs.) Every
-# model specifies its parameters, its sensor and the noise of the sensor, and the terms
-# come from one library. Terms that a model already contains, or that cannot occur, are
-# excluded; for the mounting head, only two terms are tried. The models that A4 also
-# needs are in `textbook_models.py`.
+# The recordings show the motion of a pendulum, falling balls, a marble that bounces on
+# paper, a positioning stage, and a mounting head that places components. Each system
+# has a textbook model of a few lines, and `diagnose` determines what this model lacks.
+# (Notebook A4 tests how well the completed models predict another recording in free
+# runs.) Every model specifies its parameters, its sensor and the noise of the sensor,
+# and the terms come from one library. Terms that a model already contains, or that
+# cannot occur, are excluded; for the mounting head, only two terms are tried. The
+# models that A4 also needs are in `textbook_models.py`.
 #
 # The recordings are public. The package contains only those of the pendulum, reduced to
 # every tenth sample (`jaxcam.data.PENDULUM`):
@@ -155,7 +155,7 @@ ask(
 # Gravity is known, so the model has no parameters. The noise of a film is not specified
 # anywhere; it is estimated from the scatter about a polynomial of degree 5 fitted to
 # each drop, and one value is used for all balls. In the first samples, the hand still
-# holds the ball, so the first tenth of the height of fall is omitted. Terms for dry
+# holds the ball, so the first tenth of the drop height is omitted. Terms for dry
 # friction, springs and hinges are excluded, because a ball in the air has none.
 
 
@@ -217,9 +217,9 @@ for ball in sorted({run.name.rsplit("_drop", 1)[0] for run in drops}):
 # frames per second. A pixel corresponds to 0.799 mm, a value known to a few per cent
 # from the free fall, and the centre of the marble is known to a quarter of a pixel. The
 # track is followed from frame to frame; drops in which the marble is lost are omitted.
-# The hand disturbs the beginning of the first arc, so the first tenth of the height of
-# fall is omitted. The last arc, in which the bounces are too low to be distinguished,
-# and the samples at rest after it are omitted.
+# The hand disturbs the beginning of the first arc, so the first tenth of the drop
+# height is omitted. The end of the track, where the bounces are too low to be
+# distinguished, and the samples at rest after it are also omitted.
 
 
 # +

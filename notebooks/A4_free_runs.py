@@ -6,7 +6,7 @@
 #       format_name: light
 # ---
 
-# # A4. How well does a model predict another recording? Free runs
+# # A4. How well does a model predict a recording to which it was not fitted? Free runs
 #
 # A model is fitted to one whole recording and then simulates another one in a free run,
 # which uses only the first 20 samples and the measured input. The first line of each
@@ -99,7 +99,7 @@ for way, (seen, unseen) in by_size.items():
 # A motor moves a load through a screw; the force is the input and the position is the
 # output (the EMPS benchmark).
 #
-# The protocol of the benchmark is followed: the parameters are fitted to the first
+# We follow the protocol of the benchmark: the parameters are fitted to the first
 # recording alone, and the second recording, which contains pulses, is then simulated in
 # a free run that uses only its first 20 samples. Each line adds one term.
 
@@ -124,7 +124,7 @@ for label, more in steps.items():
 # The free-run predictions deviate from the second recording because the friction in
 # that recording is larger from the start, even before the first pulse: at the same
 # position and speed, the motor force is larger in both directions. No model fitted to
-# the first recording can predict this.
+# the first recording can predict this increase.
 
 # +
 rate = np.gradient(estimation["position_m"], estimation.time)
@@ -164,8 +164,8 @@ for way, (seen, unseen) in {
 
 # ## All recordings
 #
-# The figure shows the errors in the recording that was not fitted, relative to the
-# errors of the textbook model.
+# The figure shows the errors of the predicted recordings, relative to the errors of the
+# textbook model.
 
 # +
 with style():

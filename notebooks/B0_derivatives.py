@@ -10,8 +10,8 @@
 #
 # A trajectory can be differentiated through all of its events: an impact, the
 # infinitely many impacts of complete chatter, the sticking that follows, and the
-# release. This notebook covers these in turn, compares each derivative with a formula
-# or a finite difference, and ends with a batch.
+# release. This notebook covers these events one after another, compares each derivative
+# with a formula or a finite difference, and ends with a batch.
 
 # +
 import equinox as eqx
@@ -28,7 +28,7 @@ from jaxcam.plotting import style, time_history
 
 # -
 
-# ## Through one impact, and through chatter
+# ## Differentiate through one impact and through chatter
 #
 # A ball falls from a height of one metre, bounces ever more rapidly, and comes to rest
 # after a finite time. Stronger gravity makes the first impact earlier and faster, and
@@ -39,7 +39,7 @@ from jaxcam.plotting import style, time_history
 # $$y(t) = r g t_1 (t - t_1) - \tfrac12 g (t - t_1)^2, \qquad
 #   t_\infty = t_1 \frac{1 + r}{1 - r}.$$
 #
-# Of the infinitely many impacts about sixty are simulated, and the others are summed in
+# About sixty of the infinitely many impacts are simulated, and the others are summed in
 # closed form. The derivative of the time at which the ball comes to rest includes all
 # of them.
 
@@ -91,7 +91,7 @@ def backward(parameters):
 assert jnp.allclose(backward(ball), exact[0], rtol=1e-9)
 # -
 
-# ## Through sticking and a release
+# ## Differentiate through sticking and a release
 #
 # At 130 rpm the follower detaches from its cam once per revolution, chatters, and
 # sticks again. While it sticks, the cam alone determines its motion.
@@ -135,7 +135,7 @@ assert abs(by_state).max() < 1e-12 and abs(by_stiffness).min() > 1e-5
 assert jnp.allclose(by_stiffness, difference, rtol=1e-4)
 # -
 
-# ## A batch
+# ## A batch of simulations
 #
 # `jax.vmap` runs many simulations as one program; each batch element may have its own
 # sequence of impacts and contacts. We drop the ball from 300 heights onto a vibrating

@@ -30,9 +30,9 @@ from jaxcam.plotting import branch_diagram, multipliers, special_curves, style
 #
 # A neighbouring trajectory has its impact slightly earlier or later than the orbit, and
 # between the two impacts one trajectory is still in flight and the other has already
-# rebounded. To first order, a perturbation is multiplied by the saltation matrix, which
-# contains the impact speed in the denominator. One period, starting just after the
-# impact, consists of a free flight and an impact, so the monodromy matrix is the
+# rebounded. To first order, the impact multiplies a perturbation by the saltation
+# matrix, which has the impact speed in the denominator. One period, starting just after
+# the impact, consists of a free flight and an impact, so the monodromy matrix is the
 # product of two matrices.
 
 # +
@@ -63,7 +63,7 @@ differentiated = variational.monodromy(system, orbit, method="flow")
 print("largest difference between the two:", abs(product - differentiated).max())
 assert jnp.allclose(product, differentiated, atol=1e-8)
 
-# ## Along a branch
+# ## Multipliers along a branch
 #
 # At the fold one of the two multipliers of the orbit is +1, and at the flip one is -1.
 # Along the whole branch their product is the square of the coefficient of restitution.

@@ -81,14 +81,15 @@ with style():
     panels[-1].set_xlabel("time from release (ms)")
 # -
 
-# ## From impact to impact: the lambda-map
+# ## The lambda-map from impact to impact
 #
 # Near the release, the acceleration that presses the follower onto the cam is
 # proportional to the time $\tau$ from release: it is $c\tau$. Let $u$ be the rebound
 # speed and $\lambda = u/(c\tau^2)$. Each flight is then a map of $\lambda$ that depends
 # only on the coefficient of restitution $r$. The fixed point of this map is unstable.
-# If $\lambda$ is below it, the chatter completes in time. If $\lambda$ is above it, the
-# impacts are too fast: $\lambda$ grows beyond $3/8$, and the follower does not return.
+# If $\lambda$ is below the fixed point, the chatter completes in time. If $\lambda$ is
+# above it, the impacts are too fast: $\lambda$ grows beyond $3/8$, and the follower
+# does not return.
 
 # +
 r = float(frame.restitution)
@@ -134,15 +135,15 @@ print(f"kappa = {law.kappa:.4f} in theory, {exponent:.4f} in the simulation")
 assert abs(exponent / float(law.kappa) - 1) < 0.02
 drawn = lobe_scaling(deviation[:, 0], depth, float(law.kappa))
 
-# ## One revolution as a map
+# ## The map over one revolution
 #
-# After the last impact all states lie on one line, so the state once per revolution is
-# described by a single number, and one revolution is a map of this number (section 5.4
-# of the thesis). The map is computed at the interruption by simulating one revolution
-# from each of 900 states. It is flat where the chatter completes, and has lobes where
-# it does not. A change of the speed shifts the map sideways. The fixed point then
-# leaves the flat part and lies among lobes with slopes steeper than one, which makes
-# the motion chaotic.
+# After the last impact all states lie on one line, so a single number describes the
+# state sampled once per revolution, and one revolution is a map of this number (section
+# 5.4 of the thesis). The map is computed at the interruption by simulating one
+# revolution from each of 900 states. The map is flat where the chatter completes, and
+# has lobes where the chatter is interrupted. A change of the speed shifts the map
+# sideways. The fixed point then leaves the flat part and lies among lobes with slopes
+# steeper than one, which makes the motion chaotic.
 
 # +
 interrupted = at(critical)

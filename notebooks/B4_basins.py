@@ -10,8 +10,8 @@
 #
 # From one initial state, an oscillator settles to an orbit with one impact per period.
 # From another initial state nearby, it settles to an orbit with six impacts in six
-# periods. Which initial states lead to which orbit? And how well can this be predicted
-# if the basin boundary is as finely folded as here?
+# periods. Which initial states lead to which orbit? And how well can the final orbit be
+# predicted if the basin boundary is as finely folded as it is here?
 
 # +
 import matplotlib.pyplot as plt
@@ -28,10 +28,10 @@ from jaxcam.plotting import basin_picture, phase_portrait, style
 
 # ## The basins
 #
-# The motion from every state of a grid is simulated until it repeats. Motions that do
-# not repeat within 400 periods are extended to twice that length, and so on. The
-# transient to P(6,6) lasts about a thousand periods and would otherwise be mistaken for
-# chaos.
+# The motion from every state of a grid is simulated until it repeats. The simulation of
+# a motion that does not repeat within 400 periods is extended to twice its length,
+# repeatedly if necessary. The transient to P(6,6) lasts about a thousand periods and
+# would otherwise be mistaken for chaos.
 
 # +
 system = ImpactOscillator(omega=2.6, restitution=0.8, wall=0.0)
@@ -43,7 +43,8 @@ assert found.names == ["P(1,1)", "P(6,6)"]
 figure = basin_picture(found)
 # -
 
-# The standard errors are those of an equal number of initial states drawn at random.
+# The standard errors are those that would apply to an equal number of initial states
+# drawn at random.
 
 # ## The attractors
 #

@@ -105,7 +105,7 @@ print("residual / noise, before and after the fit:", left(before), left(found))
 # parameter has absorbed part of the missing effect, as the parameters of the spring
 # have here.
 
-# ## With friction in the hinge
+# ## The rig with friction in the hinge
 
 # +
 whole = fitting.fit(problem, start=found)

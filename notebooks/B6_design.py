@@ -10,9 +10,9 @@
 #
 # The follower of the rig in the thesis first leaves its cam at 125 rpm (valve float).
 # We want to raise this speed to 135 rpm. A stiffer spring would do this, but it would
-# increase the contact force all the time. Instead we change the cam profile: the lift
-# must stay the same, and the contact force, which wears the cam, must be as small as
-# possible. Derivatives of the float speed and of the load guide the design.
+# increase the contact force throughout the cycle. Instead we change the cam profile:
+# the lift must stay the same, and the contact force, which wears the cam, must be as
+# small as possible. Derivatives of the float speed and of the load guide the design.
 
 # +
 import equinox as eqx
@@ -189,8 +189,8 @@ for rpm in (134.5, 135.5):
 # revolution, until it is interrupted and chaos begins (notebook B3). The speed of this
 # interruption is the root of a smooth equation, so it has a derivative with respect to
 # the coefficient of restitution. Which coefficient, obtained with a softer follower
-# face, raises the interruption to 165 rpm? Newton's method finds it from this
-# derivative.
+# face, raises the interruption to 165 rpm? Newton's method, which uses this derivative,
+# finds the coefficient.
 
 
 # +

@@ -119,7 +119,7 @@ def covariant_vectors(
 @program
 def _vectors(system, state, t0, settings, turns: int, transient: int):
     n = state.shape[0]
-    # each period begins at the same phase, so time need not grow
+    # all periods begin at the same phase of the forcing, so all are run from t0
     period: Any = system.period
 
     def turn(x):
@@ -134,7 +134,7 @@ def _vectors(system, state, t0, settings, turns: int, transient: int):
         return (after, new), (x, frame, new.T @ moved, code)
 
     def backwards(inner, triangle):
-        # vectors in the frame after a period are mapped to those before it
+        # map vectors in the frame after a period to vectors in the frame before it
         solved = jax.scipy.linalg.solve_triangular(triangle, inner)
         growth = 1 / jnp.linalg.norm(solved, axis=0, keepdims=True)
         solved = solved * growth

@@ -32,9 +32,9 @@ def completed_law(system: HybridSystem, constraint) -> Callable:
     """Return the combined law of an impact and all later impacts of its chatter
     sequence.
 
-    The state after it is the linear combination of the states before and after the
-    impact that has zero normal velocity; to second order in the speed, the duration of
-    the rest of the sequence is negligible.
+    The state after the sequence is the linear combination of the states before and
+    after the impact that has zero normal velocity; to second order in the speed, the
+    duration of the rest of the sequence is negligible.
     """
     impact = impact_of(system, constraint)
 
@@ -48,7 +48,7 @@ def completed_law(system: HybridSystem, constraint) -> Callable:
 
 
 def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callable:
-    """Return the field of free flight, or of contact with the marked constraints."""
+    """Return the vector field of free flight, or of contact with marked constraints."""
     if contact is None:
         return system.vector_field
     return lambda t, x: field_in_force(system, t, x, contact)
@@ -60,7 +60,8 @@ def event_crossing(
     """Return R_x, w = F+ - R_t - R_x F-, the normal H_x, and the rate of change v of
     the gap.
 
-    The derivative of the flow across the event is R_x + w H_x / v.
+    Here, R is the `law`, H the `gap`, and F- and F+ are the fields before and after the
+    event. The derivative of the flow across the event is R_x + w H_x / v.
     """
     flow_before = field_before(t, x)
     after, law_rate = jax.jvp(lambda s: law(s, x), (t,), (jnp.ones_like(t),))
@@ -73,11 +74,11 @@ def event_crossing(
 def onto_contact(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, " n"]:
-    """Take one Newton step towards gap = normal velocity = 0 for constraints in
-    contact.
+    """Return the state after one Newton step towards gap = normal velocity = 0 for the
+    constraints in contact.
 
     A state in contact is not changed, but the derivative of the step projects
-    perturbations onto those allowed by contact: the rank falls by two for each
+    perturbations onto those allowed by contact: its rank falls by two for each
     constraint, while the dependence of the contact state on the parameters remains.
     """
     values = gaps(system, t, x)

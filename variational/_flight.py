@@ -24,7 +24,7 @@ class LinearisedFlight(NamedTuple):
     parameters.
     """
     log_volume: Float[Array, ""]
-    """Logarithm of the determinant of the first n columns (Liouville)."""
+    """Logarithm of the determinant of the first n columns, from Liouville's formula."""
 
 
 def fly_linearised(

@@ -1,16 +1,18 @@
 """The local map of a grazing orbit: discontinuity mappings and the square-root map.
 
-At a grazing point, the gap has a minimum of zero: H = v = 0 and a > 0. A neighbouring
-motion whose gap would reach the depth d = -min H > 0 hits the constraint with the speed
-sqrt(2 a d), which the impact changes by (1 + r) sqrt(2 a d) in the direction D of the
-impulse (v_x D = 1). All other effects are of higher order, so the flow is that of the
-system without the constraint, after the map
+At a grazing point, the gap H has a minimum of zero: H = 0, its rate v is 0, and its
+acceleration a is positive. A neighbouring motion whose gap would reach the depth
+d = -min H > 0 hits the constraint with the speed sqrt(2 a d). With the coefficient of
+restitution r, the impact changes the state by (1 + r) sqrt(2 a d) D, where D is the
+direction of the impulse (v_x D = 1). All other effects are of higher order, so the flow
+is that of the system without the constraint, after the map
 
     z -> z + b sqrt(d(z)),   b = (1 + r) sqrt(2 a) D,   d(z) = -(H_x z + H_mu mu).
 
-It is the zero-time discontinuity mapping of di Bernardo, Budd and Champneys (Physica D
-160, 2001); on the section v = 0, the vector is b - F v_x b / a. The composition with
-the derivative N of one period is the local map z -> N (z + b sqrt(d)) + N_mu mu.
+This map is the zero-time discontinuity mapping of di Bernardo, Budd and Champneys
+(Physica D 160, 2001); on the section v = 0, the vector is b - F v_x b / a. The
+composition with the derivative N of one period is the local map
+z -> N (z + b sqrt(d)) + N_mu mu.
 """
 
 import equinox as eqx
@@ -204,7 +206,7 @@ def grazing_form(
 
 
 def _lowest(system, orbit: Orbit, constraint):
-    """Return time and state at which the gap has its smallest smooth minimum."""
+    """Return the time and state at which the gap has its smallest smooth minimum."""
     t0, t1 = float(orbit.time), float(orbit.time + orbit.period)
     turn = simulate(system, orbit.state, t0, t1, tolerance=1e-12)
     pieces = orbit.pieces

@@ -1,8 +1,8 @@
 """Compute Lyapunov exponents of a motion with impacts.
 
 The event loop is differentiated one attempted step at a time, and a frame of tangent
-vectors is orthonormalised after each. If the LLVM backend lacks an operation, the flow
-is differentiated period by period instead.
+vectors is orthonormalised after each step. If the LLVM backend lacks an operation, the
+flow is differentiated period by period instead.
 """
 
 from collections.abc import Callable
@@ -150,7 +150,7 @@ def lyapunov_spectrum(
 
 
 def _by_xla(batched, states, given, turns: int, told: Callable, summary: Callable):
-    """Differentiate the flow over each period."""
+    """Return the summary from derivatives of the flow over each period, with XLA."""
     done = 0.0
 
     def some(batched, states):
@@ -209,7 +209,9 @@ def _refuse_hysteresis(system) -> None:
 def _by_turns(
     states, batched, shared, length, begin, settings, max_steps, seen, report
 ):
-    """Fill `seen` from the derivatives of periods; return a code for each motion."""
+    """Fill `seen` by differentiating the flow over each period; return a code for each
+    motion.
+    """
     carry = first_turn(states)
     while not seen.complete:
         carry, after = next_turns(
@@ -227,8 +229,8 @@ def _padded(lanes: int) -> int:
 
 
 def _in_turn(some: Callable, batched, states):
-    """Call `some(batched, states)` for one block of motions after another, and
-    concatenate.
+    """Call `some(batched, states)` for one block of motions after another, and return
+    the concatenated results.
 
     Blocks have equal sizes, so that one program suffices; they are padded with the last
     motion.
@@ -262,7 +264,7 @@ def _summary(seen: Seen, status, length, transient, blocks):
     with np.errstate(invalid="ignore"):
         error = means.std(axis=1, ddof=1) / np.sqrt(blocks)
     error = np.where(np.isneginf(local).any(axis=1), 0.0, error)
-    # the order of the vectors need not be that of their growth, if some vanish
+    # if some vectors vanish, their order need not be that of their growth
     mean = local.mean(axis=1)
     order = np.argsort(-np.nan_to_num(mean, nan=-np.inf), axis=1, kind="stable")
     mean, error = (np.take_along_axis(a, order, axis=1) for a in (mean, error))
@@ -281,8 +283,8 @@ def _summary(seen: Seen, status, length, transient, blocks):
 
 
 def _lanes(system, state, where, values):
-    """Split the system into the parts that differ between motions and the shared
-    parts.
+    """Return the parts of the system that differ between motions, the shared parts, and
+    the initial state of each motion.
     """
     if where is None:
         return None, system, jnp.atleast_2d(state)
@@ -323,7 +325,7 @@ def _turn(batched, shared, length):
 
 @program
 def _restitutions(batched, shared, t0, states):
-    """Return the coefficients of restitution, (motions, m)."""
+    """Return the coefficients of restitution in each motion, shape `(motions, m)`."""
 
     def one(batched, state):
         return restitutions(eqx.combine(batched, shared), t0, state)

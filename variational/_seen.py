@@ -19,7 +19,7 @@ class Seen:
         lanes, stops, n = logs.shape
         seen = Seen(lanes, stops + 1, n)
         seen.logs[:, 1:], seen.hits[:, 1:] = logs, hits
-        # the last period that was reached
+        # index of the last period that was reached
         reached = np.isfinite(hits).sum(axis=1) - 1
         seen.states[:] = states[np.arange(lanes), reached]
         return seen

@@ -24,8 +24,8 @@ def switching_saltation(
     """Return the saltation matrix of an event at a switching surface, with no
     constraint in contact.
 
-    With F- and F+ the vector field before and after, h the switching function, and R
-    the reset (the identity unless the system has one),
+    With F- and F+ the vector field before and after the event, h the switching
+    function, and R the reset (the identity unless the system has one),
 
         S = R_x + (F+ - R_t - R_x F-) h_x / (h_t + h_x F-),
 
@@ -33,9 +33,9 @@ def switching_saltation(
     Where the field is continuous, as in a bilinear oscillator, S is the identity. At
     the beginning of sliding, the rank of S falls by one, because perturbations are
     projected onto the surface. At the end of sliding, h is the function whose zero ends
-    the sliding, and S is the identity unless `holding` exceeds one. (R. I. Leine, H.
-    Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, chapter
-    7)
+    the sliding, and S is the identity unless the `holding` of the system exceeds one.
+    (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+    Systems, 2004, chapter 7)
 
     Args:
         system: The system.

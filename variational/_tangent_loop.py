@@ -15,7 +15,9 @@ _MOST = 2**24
 
 
 def _row(record, state):
-    """Store the logarithms, impacts and state at the end of each period."""
+    """Return the place in the table (-1 for none) and the entries to store there: sums
+    of the logarithms of growth, number of impacts and state at the end of a period.
+    """
     place = jnp.where(record.kind == float(RowKind.STOP), state.stops, -1.0)
     return place, [*state.logs, state.impacts, *record.after]
 

@@ -11,7 +11,8 @@ from jaxcam.hybrid import flow
 from jaxcam.hybrid.programs import program
 
 
-# growth over a period, relative to that of other vectors, below which rounding hides it
+# if orthogonalisation shortens a vector to less than this fraction of its length, the
+# rest is rounding error
 _HIDDEN = 1e-12
 # number of periods run in one call from Python
 TURNS = 16
@@ -63,7 +64,7 @@ def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnF
             matrix, made = jax.jacfwd(end, has_aux=True)(carry.state)
             columns = elementwise_product(matrix, carry.frame)
             frame, growth = orthonormal(columns)
-            # after the projection, the rest of a column may be only rounding error
+            # what orthogonalisation leaves of a column may be only rounding error
             before = jnp.sqrt(jnp.sum(columns * columns, axis=0))
             hidden = (growth > 0) & (growth < _HIDDEN * before)
             growth = jnp.where(hidden, jnp.nan, growth)
@@ -83,7 +84,7 @@ def next_turns(batched, shared, length, begin, settings, max_steps, carry: TurnF
 
 
 def elementwise_product(a, b):
-    """Multiply matrices by elementwise operations, for batches."""
+    """Return the matrix product a b, computed by elementwise operations for batches."""
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
 
 
@@ -95,7 +96,7 @@ def orthonormal(matrix: Float[Array, "n n"]):
     columns, lengths = [], []
     for k in range(matrix.shape[0]):
         column = matrix[:, k]
-        # two passes are enough
+        # two passes make the columns orthogonal to within rounding
         for _ in range(2):
             for earlier in columns:
                 column = column - jnp.sum(earlier * column) * earlier

@@ -148,8 +148,8 @@ test_functions.__test__ = False  # pyright: ignore[reportFunctionMemberAccess]
 
 
 def impact_scale(system: HybridSystem, orbit: Orbit) -> Float[Array, ""]:
-    """Return the smallest v / (v + |a| period) over the impacts outside chatter, or 1
-    if there are none.
+    """Return the smallest v / (v + |a| period) over the impacts, or 1 if there are none
+    or the orbit sticks.
 
     Here v is the speed of an impact and a the acceleration of the gap just before it;
     |a| period / v is approximately the largest entry of its saltation matrix.

@@ -65,7 +65,9 @@ def saltation_matrix(
 
 
 class SaltationParts(eqx.Module):
-    """S = regular + singular / speed; both parts are bounded at grazing."""
+    """The parts of a saltation matrix S = regular + singular / speed; both remain
+    bounded at grazing.
+    """
 
     regular: Float[Array, "n n"]
     """The bounded part, shape `(n, n)`."""
@@ -118,13 +120,13 @@ def saltation_parts(
 def saltation_into_contact(
     system: HybridSystem, t, state_before: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Map a perturbation before an impact to a perturbation in the contact that
-    follows.
+    """Return the matrix that maps a perturbation before an impact to a perturbation in
+    the contact that follows.
 
     This is for an impact after which contact begins immediately: a plastic impact, or
     one in a chatter sequence whose remaining impacts are completed analytically. The
-    normal velocity after it is zero, and the field is that of contact (thesis, eq.
-    2.30). The rank falls by two, because gap and normal velocity are then zero
+    normal velocity after the impact is zero, and the field is that of contact (thesis,
+    eq. 2.30). The rank falls by two, because gap and normal velocity are then zero
     regardless of their previous values; in a system with two states, all perturbations
     are removed, and the motion has no memory of its past.
 
@@ -157,7 +159,8 @@ def saltation_into_contact(
 def saltation_at_release(
     system: HybridSystem, t, state: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, "n n"]:
-    """Map a perturbation in contact to a perturbation in the flight after release.
+    """Return the matrix that maps a perturbation in contact to a perturbation in the
+    flight after release.
 
     At release, the contact field and the free field are equal, so the perturbation is
     unchanged. The matrix is the identity for perturbations allowed by contact, and zero
@@ -181,7 +184,7 @@ def saltation_at_release(
 def event_map(
     system: HybridSystem, t, x: Float[Array, " n"], constraint: int = 0
 ) -> Float[Array, " n"]:
-    """Map a state near an impact to the state after it, both at the same time t.
+    """Return the state after an impact for a state near it, both at the same time t.
 
     The motion is continued from `x` to its impact, before or after `t`; the impact law
     is applied; and the motion is followed back to `t` (the discontinuity mapping of di

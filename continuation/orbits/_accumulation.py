@@ -1,8 +1,8 @@
 """Detect grazing bifurcations that accumulate where chatter becomes complete.
 
-Each of them adds one impact, and the distances between them decrease geometrically.
-Their limit is the interruption of the chatter of an orbit that sticks, which is
-computed independently.
+Each of these bifurcations adds one impact, and the distances between them decrease
+geometrically. Their limit is the interruption of the chatter of an orbit that sticks;
+it is computed independently.
 """
 
 from collections.abc import Sequence
@@ -17,15 +17,16 @@ from variational import chatter_interruption
 from .._parameter import leaf_of, with_leaf
 
 
-# number of successive grazing bifurcations
+# number of successive grazing bifurcations needed to detect an accumulation
 _LEAST = 5
 # allowed change of the ratio of successive distances
 _STEADY = 0.02
-# allowed distance between the interruption and the limit of the bifurcations, relative
-# to the distance of the last one from it
+# allowed distance between the computed interruption and the limit extrapolated from the
+# bifurcations, relative to the distance of the last bifurcation from this limit
 _AGREES = 0.5
 
-# distance from the interruption, relative to the parameter
+# distance from the interruption at which the continued branch starts, relative to the
+# parameter
 _INSIDE = 1e-13
 
 
@@ -33,18 +34,18 @@ class Accumulation(NamedTuple):
     """The interruption of chatter at which grazing bifurcations accumulate."""
 
     system: Any
-    """The system there."""
+    """The system at the interruption."""
     value: float
-    """The parameter there."""
+    """Value of the parameter at the interruption."""
     distance: float
-    """Change of the parameter from the last bifurcation."""
+    """Change of the parameter from the last bifurcation to the interruption."""
 
 
 def accumulation(problem: Any, points: Sequence[Any]) -> Accumulation | None:
     """Return where grazing bifurcations accumulate, or None if they do not.
 
-    `problem` is an `ImpactingOrbits`, and `points` are the bifurcations so far. Chatter
-    theory needs two states and one constraint.
+    `problem` is an `ImpactingOrbits`, and `points` are the bifurcations so far. The
+    theory of chatter applies to systems with two states and one constraint.
     """
     last = points[-_LEAST:]
     planar = problem.dimension == 2 and set(problem.constraints) == {0}

@@ -33,8 +33,8 @@ _MOST = 48
 # minimum ratio of the slowest to the fastest rebound of this orbit; slower impacts
 # would be below the tolerance
 _SLOWEST = 1e-3
-# distances to try are the width of the bounds times powers of 2: lowest exponent, and
-# maximum number of trials
+# the width of the bounds times powers of 2 gives the distances to try: lowest exponent,
+# and maximum number of trials
 _NEAREST, _TRIALS = -40, 4
 
 
@@ -75,8 +75,9 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
     value.
 
     Returns:
-        Phases and states `(k, _MOST, 3)`, the number that belong to the orbit (0 if it
-            sticks), and the ratio of the slowest to the fastest rebound.
+        Phases of `_MOST` impacts and states after them, `(k, _MOST, 3)`; the number of
+            these impacts that belong to the orbit (0 if it sticks); and the ratio of
+            the slowest to the fastest rebound.
     """
 
     def one(value):
@@ -95,7 +96,7 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
         mine = jnp.arange(_MOST) < orbit.impacts
         fastest = jnp.max(jnp.where(mine, speeds, 0.0))
         slowest = jnp.min(jnp.where(mine, speeds, jnp.inf)) / fastest
-        # the margin is NaN if contact occurs earlier
+        # the margin is NaN if contact occurs in an earlier period
         finite = jnp.isfinite(orbit.margin) & (orbit.margin > 0)
         return rows, jnp.where(finite, orbit.impacts, 0), slowest
 
@@ -105,7 +106,9 @@ def _from_release(parameters: HybridSystem, leaf: int, values, periods: int):
 def _closed_up(
     periods: int, point: Any, value: float, rows, sense: float, width: float
 ) -> Start | None:
-    """Return the periodic orbit near the motion from release, and its tangent."""
+    """Return the start of a branch at the periodic orbit near the motion from release;
+    None if there is no such orbit.
+    """
     # a JAX array, because the forcing period is evaluated outside of a program
     moved = jnp.asarray(value, jnp.float64)
     parameters = with_leaf(point.problem.parameters, point.leaf, moved)
@@ -128,7 +131,7 @@ def _closed_up(
     if not np.all(np.isfinite(at.tangent)):
         return None
     # x grows as the parameter increases if the dominant multiplier is below one, and as
-    # it decreases if that multiplier is above one; the others are close to zero
+    # the parameter decreases if it is above one; all others are close to zero
     one = np.eye(at.linearisation.shape[0])
     away = sense * float(np.sign(np.linalg.det(one - at.linearisation)))
     tangent = at.tangent * (away or 1.0)

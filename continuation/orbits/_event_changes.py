@@ -33,7 +33,7 @@ def monitors_of_events() -> dict[str, Monitor]:
 
 
 def values_of_events(arrival: Any) -> dict[str, Float[Array, ""]]:
-    """Return the monitors for the `Arrival` of an orbit: +1 or -1."""
+    """Return the value of each monitor, +1 or -1, from the `Arrival` of an orbit."""
     found = {}
     m = arrival.contact.shape[0]
     k = (arrival.start.shape[0] - m) // 2
@@ -49,8 +49,8 @@ def values_of_events(arrival: Any) -> dict[str, Float[Array, ""]]:
 def events_of(
     system: HybridSystem, state, start, end, settings: Settings
 ) -> list[tuple[float, Event]]:
-    """Return the events of one period of a motion with their times (s); none if it
-    fails.
+    """Return the events of one period of a motion with their times (s); an empty list
+    if the simulation fails.
 
     The period begins in the longest interval without events, so that an event at
     `start` occurs once.
@@ -104,7 +104,7 @@ def name_of_change(
 
 
 def _rotated(first: list[Event], second: list[Event]) -> bool:
-    """Return whether two sequences differ only by their first event."""
+    """Return whether two periodic sequences are equal except for where they start."""
     if len(first) != len(second):
         return False
     turns = range(max(1, len(first)))

@@ -10,8 +10,8 @@ from ._run_twice import away_from_half, rotations
 
 
 class ImpactSequences(AbstractRepresentation):
-    """An orbit with m impacts can start at any of them; m of the unknowns are impact
-    times.
+    """The representations of an orbit with m impacts, which can start at any of them;
+    m of the unknowns are impact times.
     """
 
     family: str = eqx.field(static=True)
@@ -34,7 +34,7 @@ class ImpactSequences(AbstractRepresentation):
         problem = self.problem
         if not (problem.periods and problem.constraints):
             return states
-        # a motion repeats after a whole number of forcing periods
+        # all phases may be shifted by a whole number of forcing periods
         phases = np.zeros(u.size)
         phases[:: 1 + problem.dimension] = 1.0
         return states + np.round(u[0] - states[:, :1]) * phases

@@ -36,7 +36,7 @@ class AbstractOrbits(AbstractProblem):
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
         """Return the monodromy matrix for the state just after the first impact.
 
-        Without forcing, it is that of the return map to the constraint.
+        Without forcing, return the derivative of the return map to the constraint.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -55,10 +55,10 @@ class AbstractOrbits(AbstractProblem):
         return orbits.return_map(self.equations, u, parameters, matrix)
 
     def local_dynamics(self, u, parameters) -> LocalDynamics:
-        """Return the map from the first impact to the one a period later.
+        """Return the map from the first impact to the impact one period later.
 
-        It acts on the phase of the impact and the state after it, or only on the state
-        if there is no forcing.
+        The map acts on the phase of the impact and the state after it, or only on the
+        state if there is no forcing.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -70,7 +70,9 @@ class AbstractOrbits(AbstractProblem):
         return LocalDynamics(at, None, jacobian)
 
     def derivatives(self, u, p, parameters_at):
-        """Return both derivatives from one Jacobian of each flight.
+        """Return the derivative of the residual and the monodromy matrix.
+
+        Both follow from one Jacobian of each flight.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -95,8 +97,8 @@ class AbstractOrbits(AbstractProblem):
         """Return the monitors and the observed quantities.
 
         The observed quantities are the period (s), the time (s) and state after the
-        first impact, the integration error, the scale of the gaps in their units and,
-        with forcing, the states at integer multiples of the forcing period,
+        first impact, the integration error, the scale of the gaps (in their unit)
+        and, with forcing, the states at integer multiples of the forcing period,
         `(periods, n)`.
 
         Args:
@@ -125,7 +127,7 @@ class AbstractOrbits(AbstractProblem):
         return monitors, found
 
     def scale(self, u, parameters) -> Float[Array, " u"]:
-        """Return the scales of the unknowns; padding does not count.
+        """Return the scales of the unknowns, computed without the padding.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.
@@ -134,7 +136,7 @@ class AbstractOrbits(AbstractProblem):
             Shape `(u,)`.
         """
         del parameters
-        # padding is zero
+        # unknowns of padding are zero, and do not contribute to the sum
         mean = jnp.sum(u * u) / self.number_of_unknowns(u)
         size = jnp.maximum(1.0, jnp.sqrt(mean))
         return jnp.broadcast_to(size, u.shape)

@@ -20,7 +20,8 @@ from ._signature import with_impact, without_impact
 from ._watched import Watched, watched_of
 
 
-# distance at which the sign of a slope is determined, for unknowns of size one
+# displacement for the difference that gives the sign of a slope, for unknowns of size
+# one
 _NUDGE = 1e-6
 
 
@@ -35,7 +36,8 @@ def _lowest(problem, u, parameters):
 
 
 def orbit_grazing(problem: Any, point: Any) -> Start | None:
-    """Return the orbit at grazing, with the impact of zero speed removed or inserted.
+    """Return the start of a branch at grazing, with the impact of zero speed removed or
+    inserted.
 
     `problem` is an `ImpactingOrbits`, and so is the problem of the start.
 
@@ -81,8 +83,8 @@ def _direction(
 ) -> np.ndarray | None:
     """Return the direction of the branch in which a monitor grows.
 
-    The slope is a difference, computed with the compiled program of the continued
-    branch; this is sufficient, because only the sign of the slope matters.
+    The slope is a difference quotient, computed with the compiled program of the
+    continued branch; this is sufficient, because only the sign of the slope matters.
     """
     z = np.append(u, point.parameter)
     one = np.ones_like(z)

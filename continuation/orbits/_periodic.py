@@ -76,7 +76,7 @@ def periodic_orbits(
 
 
 def start_of(system: Any, start: Any) -> Start:
-    """Convert the arguments of `follow(system, orbit, ...)` to a problem."""
+    """Return the start of the branch that `follow(system, orbit, ...)` follows."""
     if isinstance(start, Start):
         return start
     if isinstance(start, Orbit) or start is None:

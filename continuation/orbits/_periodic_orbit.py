@@ -144,7 +144,7 @@ def _periods(base: float | None, period, periods) -> int:
 
 
 def _counted(base: float | None, period, periods) -> int:
-    """Return the number of forcing periods, if it is given."""
+    """Return the given number of forcing periods, if it is valid."""
     if base is None:
         raise ValueError(
             "this system has no forcing; give a guess of the orbit's period in "
@@ -158,7 +158,7 @@ def _counted(base: float | None, period, periods) -> int:
 
 
 def _settled(system, base, number: int, free: bool, t0):
-    """Return the state and period of the motion after many periods."""
+    """Return the state after many forcing periods, and the period counted in them."""
     if base is None:
         raise ValueError(
             "a system without forcing needs an initial guess; give a guess of the state"
@@ -222,7 +222,7 @@ def _dimension(system) -> int:
 
 
 def _by_shooting(system, guess, length, number, t0, settings):
-    """Find the orbit with the impacts of the motion from the guess, or why it fails."""
+    """Return the orbit with the impacts of the guessed motion, or None and a reason."""
     turn = simulate(system, guess, t0, float(t0) + length, settings=settings)
     if not bool(turn.successful):
         return None, turn.result
@@ -242,8 +242,8 @@ def _by_shooting(system, guess, length, number, t0, settings):
         orbit, why = _with_impacts_of(system, turn, number, start, settings)
         if orbit is not None:
             return orbit, None
-    # an impact at the ends would be counted twice or not at all, so begin within a
-    # flight
+    # an impact at the ends of the period would be counted twice or not at all, so
+    # begin within a flight
     if not count:
         turn = simulate(system, guess, t0, start + 2 * length, settings=settings)
         if not bool(turn.successful) or not int(turn.impacts.count):
@@ -257,8 +257,8 @@ def _by_shooting(system, guess, length, number, t0, settings):
 
 
 def _with_impacts_of(system, turn, number, t0, settings):
-    """Return the orbit with the impacts of one period from `t0`, or the reason for
-    failure.
+    """Return the orbit with the impacts of the simulated period `turn`, or None and the
+    reason for failure.
     """
     try:
         equations, u = seed(system, turn, number)
@@ -279,14 +279,14 @@ def _with_impacts_of(system, turn, number, t0, settings):
 
 
 def _touches(system, state, t0, length) -> bool:
-    """Return whether a gap is closed, to within rounding."""
+    """Return whether any gap is closed in this state, to within rounding."""
     t0 = jnp.asarray(t0)
     sizes = gap_sizes(system, t0, state, jnp.asarray(length))
     return bool(jnp.any(gaps(system, t0, state) <= _CLOSED * sizes))
 
 
 def _by_flow(system, guess, length, number, t0, settings):
-    """Apply Newton's method to the map over one period, computed by the event loop."""
+    """Return the orbit from Newton's method on the period map, or None and a reason."""
     start, end = jnp.asarray(float(t0)), jnp.asarray(length)
     state, found, success = _root(system, guess, start, end, settings, number == 0)
     if not bool(success):

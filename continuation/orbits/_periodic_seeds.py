@@ -73,7 +73,7 @@ def orbits_near(
 
 
 def _passes(system: HybridSystem, orbit: Orbit, state, same: float) -> bool:
-    """Return whether an orbit starts at this state."""
+    """Return whether an orbit starts at this state, to within the tolerance `same`."""
     current = np.asarray(orbit.state)
     sizes = component_sizes(system, orbit.time, current, orbit.period)
     return bool(np.all(np.abs(current - state) <= same * np.asarray(sizes)))

@@ -191,7 +191,7 @@ class StickingOrbits(AbstractProblem):
 
 
 def _stroboscopic(system, turn: ChatterOrbit, periods: int) -> Float[Array, "m n"]:
-    """Return the states at the first integer multiples of the period after release."""
+    """Return the states at the first multiples of the forcing period after release."""
     period = system.period
     first = jnp.ceil(turn.frame.release / period)
 

@@ -33,7 +33,7 @@ def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
 def rotations(
     problem: Any, u: Float[np.ndarray, " u"], rate: bool = False
 ) -> Float[np.ndarray, "m u"]:
-    """Return the orbit starting at each of its m impacts.
+    """Return the unknowns of an orbit for a start at each of its m impacts.
 
     **Arguments:** `rate`: whether `u` is a derivative of the unknowns along a branch.
     """

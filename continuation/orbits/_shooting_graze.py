@@ -1,4 +1,4 @@
-"""Compute multipliers of an impacting orbit, including an impact of zero speed."""
+"""Compute multipliers of an orbit with impacts, one of which may have zero speed."""
 
 from typing import Any
 
@@ -18,8 +18,8 @@ from ._watched import Watched
 
 
 # speed below which an impact counts as grazing, relative to one plus the largest
-# component of the state: located grazing points are below it, and a matrix divided by
-# such a speed contains only rounding errors
+# component of the state: at located grazing points, the speed is lower, and a matrix
+# divided by such a speed contains only rounding errors
 _NO_SPEED = 1e-8
 ONE = (
     "an impact has zero speed here: one multiplier is infinite, which is the limit "
@@ -34,8 +34,8 @@ NONE = (
 def multipliers_of(
     problem: Any, u: np.ndarray, parameters: Any, at: Any
 ) -> tuple[Any, str]:
-    """Return the multipliers (k,), largest modulus first, and a sentence if one is
-    infinite or unknown.
+    """Return the multipliers (k,), largest modulus first, and a sentence if any of them
+    is infinite or unknown.
     """
     m = len(problem.constraints)
     speeds = np.array([float(at.monitors[Watched("speed", k).name]) for k in range(m)])
@@ -54,8 +54,8 @@ def multipliers_of(
     if not np.all(np.isfinite(found[1:])):
         return unknown, NONE.format("the grazing is not simple")
     if not problem.periods:
-        # without forcing, a time shift is a deviation that persists, with multiplier
-        # one
+        # without forcing, remove the trivial multiplier one, which belongs to a shift
+        # in time
         finite = np.flatnonzero(np.isfinite(found))
         trivial = finite[np.argmin(np.abs(found[finite] - 1.0))]
         found = np.delete(found, trivial)

@@ -7,7 +7,7 @@ from variational.orbits import flown, Shooting
 
 
 def without_impact(equations: Shooting, u, parameters, number: int):
-    """Return the equations and the state without impact `number`."""
+    """Return the equations and the unknowns of the orbit without impact `number`."""
     hits, periods = equations.constraints, equations.periods
     rows = np.array(u).reshape(len(hits), -1)
     hits = hits[:number] + hits[number + 1 :]
@@ -30,8 +30,9 @@ def without_impact(equations: Shooting, u, parameters, number: int):
 def with_impact(
     equations: Shooting, u, parameters, flight: int, start, time: float, which: int
 ):
-    """Return the equations with an additional impact on `which` at `time` (s) in a
-    flight from the row `start` (time, state).
+    """Return the equations and the unknowns with an additional impact on constraint
+    `which`, at `time` (s) in flight number `flight`, which begins at the row `start`
+    (time, state).
     """
     first = jnp.asarray(start[0]), jnp.asarray(start[1:])
     state = flown(parameters, *first, jnp.asarray(time))
@@ -53,8 +54,8 @@ def _with(equations: Shooting, constraints, steps: int | None = None) -> Shootin
 
 
 def _renumbered(periods, rows, number):
-    """Remove one row; without forcing, time is measured from the first remaining
-    row.
+    """Return the rows without row `number`; without forcing, times are measured from
+    the first remaining row.
     """
     if periods or number:
         return np.delete(rows, number, axis=0)

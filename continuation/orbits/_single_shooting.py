@@ -145,7 +145,7 @@ class SingleShooting(AbstractProblem):
         matrix = jacobian[:n, :n] + jnp.eye(n)
         if self.periods:
             return matrix
-        # the last column is the rate of change of the state
+        # the last column, for the period, is the rate of change of the state
         rate, normal = jacobian[:n, n], self.normal / self._sizes(u, parameters)
         across = jnp.linalg.svd(normal[None])[2][1:].T
         moved = matrix @ across
@@ -227,7 +227,7 @@ class SingleShooting(AbstractProblem):
             return self
         u = jnp.asarray(u)
         normal = _direction(self, u, parameters)
-        # the sign is kept continuous for the test functions
+        # keep the sign of the normal, so that the test functions are continuous
         normal = jnp.where(normal @ self.normal < 0, -normal, normal)
         return dataclasses.replace(self, reference=u[:-1], normal=normal)
 

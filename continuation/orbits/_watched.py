@@ -15,7 +15,9 @@ STICKS = "sticks"
 
 
 class Watched(NamedTuple):
-    """The lowest gap within a flight, or the approach speed of an impact."""
+    """A monitored quantity: the lowest gap in a flight, or the approach speed of an
+    impact.
+    """
 
     what: Literal["gap", "speed"]
     number: int

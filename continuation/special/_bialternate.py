@@ -13,8 +13,8 @@ def pairs(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def additive(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
-    """Return twice the bialternate product of A and I, which has eigenvalues l_i + l_j,
-    i < j.
+    """Return twice the bialternate product of A and I; its eigenvalues are the sums
+    l_i + l_j, i < j, of the eigenvalues of A.
 
     See Kuznetsov, Elements of Applied Bifurcation Theory, section 10.2.
     """
@@ -29,16 +29,18 @@ def additive(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
 
 
 def multiplicative(a: Float[Array, "n n"]) -> Float[Array, "m m"]:
-    """Return the bialternate product of A with itself, which has eigenvalues l_i l_j, i
-    < j.
+    """Return the bialternate product of A with itself; its eigenvalues are the products
+    l_i l_j, i < j, of the eigenvalues of A.
     """
     i, j = pairs(a.shape[0])
     return a[np.ix_(i, i)] * a[np.ix_(j, j)] - a[np.ix_(i, j)] * a[np.ix_(j, i)]
 
 
 def plane(w: Float[Array, " m"], n: int) -> Float[Array, "n n"]:
-    """Return the antisymmetric matrix of a vector indexed by pairs; its range is their
-    plane.
+    """Return the antisymmetric matrix with the entries of w above its diagonal.
+
+    If w is an eigenvector of a compound matrix, the range of the result is the
+    invariant plane of the pair of eigenvalues to which w belongs.
     """
     i, j = pairs(n)
     upper = jnp.zeros((n, n), w.dtype).at[i, j].set(w)

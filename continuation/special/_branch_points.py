@@ -18,10 +18,10 @@ from ..problem import AbstractProblem, StabilityKind
 from ._jacobian import jacobian_of
 
 
-# displacement for the second derivatives in the correction, for unknowns of size one:
-# their error only slows the iteration, in which the equations themselves are exact
+# displacement for finite-difference second derivatives, for unknowns of size one: their
+# error only slows the iteration down, because the equations themselves are exact
 _DISPLACED = 2.0**-15
-# slack that may remain because of integration errors
+# largest slack at a branch point, which may not be zero because of integration errors
 _SLACK = 1e-10
 # maximum number of corrections
 _MOST = 30
@@ -64,15 +64,15 @@ class BranchPoints(AbstractProblem):
         return jnp.concatenate([sizes, jnp.reshape(self.width, (1,)), ones])
 
 
-# `parameters` is a property, which type checkers interpret as an argument
+# `parameters` is a property, but type checkers take it for a constructor argument
 _crossing: Any = BranchPoints
 
 
 def solved_crossing(
     problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
-    """Find the branch point near z = (u, parameter) by Newton's method with second
-    derivatives; also return whether it succeeded.
+    """Return the branch point near z = (u, parameter), found by Newton's method with
+    second derivatives, and whether the method succeeded.
     """
     at = _at(problem, context, guess)
     if not np.all(np.isfinite(at.jacobian)):
@@ -88,8 +88,8 @@ def solved_crossing(
 def differenced_crossing(
     problem: AbstractProblem, context: Context, guess
 ) -> tuple[np.ndarray, bool]:
-    """Find the branch point from differences of Jacobians, using the corrector's
-    program.
+    """Return the branch point, found with differences of Jacobians from the corrector's
+    program, and whether the iteration succeeded.
 
     The second derivatives are computed only once. Convergence is linear, and fast near
     the branch point, where bracketing ends because the equations are singular.

@@ -14,7 +14,7 @@ def along(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the first and second derivative of a matrix along a direction.
 
-    The method is central differences at successively halved distances, extrapolated to
+    Central differences at successively halved distances are extrapolated to distance
     zero as long as that reduces the error (Ridders, Advances in Engineering Software 4,
     1982). With Jacobians accurate to rounding, the relative error is about 1e-12 for
     the first derivative and 1e-9 for the second.
@@ -37,8 +37,8 @@ def along(
 
 
 def _limit(values: np.ndarray) -> np.ndarray:
-    """Return the limit of values at distances h, h/2, ..., which are even in the
-    distance.
+    """Return the limit at distance zero of values at the distances h, h/2, ..., which
+    are even functions of the distance; NaN if the error estimate is too large.
     """
     best, error = np.full_like(values[0], np.nan), np.inf
     row = [values[0]]

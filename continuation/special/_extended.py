@@ -56,7 +56,7 @@ class AbstractExtended(AbstractProblem):
         return self.base.check(replace(inner, tests=tests))
 
     def monitor_of_base(self, name: str) -> str:
-        """Return the name of a monitor of the inner problem in the extended problem."""
+        """Return the name that a monitor of the inner problem has in this problem."""
         return name
 
 

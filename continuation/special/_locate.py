@@ -22,7 +22,7 @@ from ._test_functions import (
 )
 
 
-# `parameters` is a property, which type checkers interpret as an argument
+# `parameters` is a property, but type checkers take it for a constructor argument
 _singular: Any = SingularPoints
 
 
@@ -31,7 +31,7 @@ _JUMP = 1e-6
 
 
 class Located(NamedTuple):
-    """A special point."""
+    """The result of locating a special point, with a reason if that failed."""
 
     z: np.ndarray
     converged: bool
@@ -41,8 +41,8 @@ class Located(NamedTuple):
 def singular_points(
     problem: AbstractProblem, kind: str, context: Context, z: np.ndarray
 ) -> SingularPoints:
-    """Return the extended problem for a kind of special point, with borders computed
-    near it.
+    """Return the extended problem for a kind of special point, with border vectors
+    computed at z, a point near the special point.
     """
     m = matrix_at(problem, kind, context.leaf, z)
     border = np.zeros(m.shape[0])
@@ -87,7 +87,7 @@ def locate(
     monitor = problem.monitors().get(name)
     automatic = context.settings.localise != "newton"
     if monitor is not None and problem.costly and not monitor.bracket and automatic:
-        # compiling the extended system would take longer than some more points
+        # compiling the extended system would take longer than a few more points
         z = _on_the_way(problem, name, context, a, b, values)
         if z is not None:
             return Located(z, True, "")
@@ -112,7 +112,7 @@ def locate(
         middle = correct(problem, context, guess, chord / a.scale, a.tangent)
         if not middle.success or not _inside(middle.z, low[0], high[0], a.scale):
             if name == BRANCH_POINT:
-                # the equations are singular there, so the corrector fails first
+                # close to it, the equations are singular, so the corrector fails
                 return _between_branches(problem, context, a, b, guess)
             reason = "the branch could not be computed between two of its points"
             return Located(guess, False, reason)
@@ -173,7 +173,7 @@ def _between_branches(
     b: Corrected,
     guess: np.ndarray,
 ) -> Located:
-    """Find the branch point near the point at which bracketing ended."""
+    """Return the branch point near `guess`, where bracketing ended."""
     z, success = differenced_crossing(problem, context, guess)
     if success and _inside(z, a.z, b.z, a.scale):
         return Located(z, True, "")
@@ -186,7 +186,7 @@ def _between_branches(
 
 
 def _next_guess(low, high, attempt: int) -> np.ndarray:
-    """Alternate between secant and bisection."""
+    """Return a secant estimate in the bracket, or its middle in every third attempt."""
     share = 0.5
     if attempt % 3 != 2:
         share = abs(low[1]) / (abs(low[1]) + abs(high[1]))
@@ -225,9 +225,9 @@ def ahead(
 ) -> Located | None:  # fmt: skip
     """Find the zero of a monitor within `reach` ahead of a point of the branch, if any.
 
-    This is for monitors that do not change sign, or that end the branch: the solution
-    may not exist at or beyond the zero. The zero is therefore approached from this
-    side, level by level.
+    This function is for monitors that do not change sign or that end the branch: the
+    solution may not exist at or beyond the zero. The zero is therefore approached from
+    this side, level by level.
     """
     z, level, failures = a.z, value, 0
 
@@ -259,8 +259,8 @@ def ahead(
 
 
 def pair_is_complex(problem, kind: str, context: Context, z: np.ndarray, at) -> bool:
-    """Return whether a critical pair is complex; otherwise, the point is a neutral
-    saddle.
+    """Return whether a critical pair of eigenvalues is complex; if it is real, the
+    point is a neutral saddle. Points of other kinds need no pair: return True.
     """
     if kind not in (HOPF, NEIMARK_SACKER):
         return True

@@ -91,7 +91,7 @@ class MonitorLevel(AbstractProblem):
         return jnp.concatenate([sizes, jnp.reshape(self.width, (1,))])
 
 
-# `parameters` is a property, which type checkers interpret as an argument
+# `parameters` is a property, but type checkers take it for a constructor argument
 _level: Any = MonitorLevel
 
 

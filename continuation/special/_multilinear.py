@@ -4,7 +4,7 @@ import jax
 
 
 def second(function, u, a, b):
-    """Return B(a, b), the second derivative at u."""
+    """Return B(a, b), the second derivative of a function at u along a and b."""
 
     def first(u):
         return jax.jvp(function, (u,), (a,))[1]
@@ -13,5 +13,5 @@ def second(function, u, a, b):
 
 
 def third(function, u, a, b, c):
-    """Return C(a, b, c), the third derivative at u."""
+    """Return C(a, b, c), the third derivative of a function at u along a, b and c."""
     return jax.jvp(lambda u: second(function, u, a, b), (u,), (c,))[1]

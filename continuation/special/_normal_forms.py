@@ -45,14 +45,15 @@ def _jacobians(problem, parameters, u, moves):
 
 
 def _parts(x: Any):
-    """Split a complex vector into real vectors and their factors."""
+    """Return the real vectors of which x consists, each with its factor 1 or 1j."""
     if np.isrealobj(x):
         return [(1.0, x)]
     return [(1.0, x.real), (1j, x.imag)]
 
 
 class _Derivatives:
-    """The derivatives A, B and C of a problem at a point, also for complex arguments.
+    """The first, second and third derivatives A, B and C of a problem at a point, also
+    for complex arguments.
 
     They are computed by nested differentiation, or from differences of Jacobians if the
     problem sets `costly`.
@@ -147,8 +148,8 @@ class _Derivatives:
 
 
 def _critical_pair(a: np.ndarray, distance: Callable) -> tuple[Any, Any] | None:
-    """Return the eigenvalue of the complex pair closest to critical, and its unit
-    eigenvector; None without such a pair.
+    """Return the eigenvalue of the complex pair for which `distance` is smallest, and
+    its unit eigenvector; None if all eigenvalues are real.
     """
     found: Any = np.linalg.eig(a)
     values, vectors = (x.astype(complex) for x in found)
@@ -201,8 +202,8 @@ def fold_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
 
 
 def flip_form(d: _Derivatives, at: Corrected) -> tuple[float | None, str]:
-    """Return the coefficient c of x -> -x + c x^3; if it is positive, the doubled orbit
-    is stable.
+    """Return the coefficient c of x -> -x + c x^3; if it is positive, the
+    period-doubled orbit is stable.
     """
     a = d.a(at)
     one = np.eye(a.shape[0])

@@ -51,8 +51,8 @@ def _singular_matrix(problem, kind: str, leaf: int, z):
 
 
 def matrix_at(problem, kind: str, leaf: int, z) -> np.ndarray:
-    """Return the matrix that is singular at this kind of point, compiled; z = (u,
-    p).
+    """Return `singular_matrix` at z = (u, parameter), computed by a compiled
+    program.
     """
     return np.asarray(_singular_matrix(problem, kind, leaf, np.asarray(z)))
 

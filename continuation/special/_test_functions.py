@@ -20,7 +20,7 @@ _HUGE = 1e100
 
 
 def kinds(problem: AbstractProblem) -> tuple[str, ...]:
-    """Return the kinds of special points detected in addition to the monitors."""
+    """Return the kinds of special points detected in addition to zeros of monitors."""
     if not problem.detects:
         return ()
     common = (BRANCH_POINT, FOLD)
@@ -29,7 +29,9 @@ def kinds(problem: AbstractProblem) -> tuple[str, ...]:
 
 
 def has_own_dynamics(problem: AbstractProblem) -> bool:
-    """Return whether normal forms and linearisation belong to different maps."""
+    """Return whether a problem overrides `local_dynamics`, so that its normal forms and
+    its linearisation belong to different maps.
+    """
     return type(problem).local_dynamics is not AbstractProblem.local_dynamics
 
 
@@ -61,7 +63,9 @@ def test_values(problem: AbstractProblem, leaf: int, at: Corrected) -> dict[str,
 
 
 def _product(factors: np.ndarray) -> float:
-    """Return a number with the sign of the (real) product."""
+    """Return a number with the sign of the product, which is real, and the modulus of
+    the smallest factor.
+    """
     sizes = np.abs(factors)
     if not factors.size or not np.all(sizes > 0):
         return 0.0
@@ -78,7 +82,9 @@ def eigenvalues_at(
 
 
 def is_stable(problem: AbstractProblem, eigenvalues: Any) -> bool | None:
-    """Return whether all eigenvalues are on the stable side; None if undefined."""
+    """Return whether all eigenvalues are on the stable side; None if stability is not
+    computed or an eigenvalue is not finite.
+    """
     if problem.stability == "none" or not np.all(np.isfinite(eigenvalues)):
         return None
     if problem.stability == "map":

@@ -17,11 +17,12 @@ from .engine import (
 )
 
 
-# Cost per sample, or per component of a joint, that noise does not explain: with noise
-# alone it is 1 on average, and within a few per cent of 1 for thousands of samples
+# Costs above which noise does not explain the residuals: per sample of a piece, per
+# component of a joint, and per sample of all data. With noise alone, each of them is 1
+# on average, and the last one is within a few per cent of 1 for thousands of samples
 _PIECE, _JOINT, _MEAN = 4.0, 9.0, 4.0
-# Fraction of the pieces that must be below the limit, so that one bad recording of many
-# does not matter
+# Fraction of the pieces whose cost must be below the limit, so that one bad recording
+# among many does not matter
 _USUAL = 0.75
 # Tolerance for reaching a bound, relative to the parameter's scale
 _ON_BOUND = 1e-9
@@ -48,13 +49,13 @@ class Reason(NamedTuple):
     """A reason not to trust a fit: a `Doubt`, and a sentence that explains it."""
 
     doubt: Doubt
-    """A `Doubt`."""
+    """The kind of doubt."""
     sentence: str
     """The doubt in words."""
 
 
 def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str:
-    """Return a sentence that names the non-finite quantity; empty if all are finite."""
+    """Return a sentence that names a non-finite quantity, or an empty string."""
     pieces = problem.pieces
     flown = np.asarray(costs.flown) + np.asarray(costs.joints)
     exists = np.asarray(pieces.exists)

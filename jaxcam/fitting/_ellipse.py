@@ -29,7 +29,7 @@ class Ellipse:
 
     @property
     def limit(self) -> float:
-        """Chi-square at the boundary."""
+        """Chi-square at the boundary of the region."""
         return float(scipy.stats.chi2.ppf(self.level, len(self.names)))
 
     @property
@@ -50,7 +50,7 @@ class Ellipse:
         return np.sum(off**2, axis=-1)
 
     def contains(self, points: Float[np.ndarray, "*k d"]) -> Bool[np.ndarray, "*k"]:
-        """Return whether points lie inside."""
+        """Return whether points lie inside the region."""
         return self.chi_square(points) <= self.limit
 
     def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:

@@ -30,22 +30,26 @@ from .engine import (
 
 _ITERATIONS = 60
 PROMISE = 1e-3
-"""The iteration ends if the predicted gain in twice the log-likelihood is below this.
+"""The iteration ends if the predicted gain in twice the log-likelihood is below this
+value.
 """
-# limit of the predicted gain of an undamped step: less than a tenth of a standard error
+# Largest gain predicted for an undamped step at an optimum: such a step changes no
+# parameter by more than a tenth of its standard error
 _GRADIENT = 1e-2
 # Maximum number of corrections before a step is accepted or rejected
 _CORRECTIONS = 3
-# Each correction must reduce the excess cost to less than this fraction
+# Each correction must reduce the excess cost to less than this fraction of its previous
+# value
 _LEADS_BACK = 0.5
 # A flight with more pieces than this is first fitted with loose joints
 _LONG = 16
-# Factors on parameters without a tolerance, for restarts of a fit that ended far off
+# Factors on parameters without a tolerance, for restarts of a fit that ended far from
+# the data
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
-# Damping relative to the scales of the parameters
+# Initial, minimum and maximum damping, relative to the scales of the parameters
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
-# Factors on the damping: after a good step; and after a poor step, or a good step that
-# follows a rejected one
+# Factor on the damping after a good step, and factor after a poor step or after a good
+# step that follows a rejected one
 _EASED, _POOR = 0.1, 0.5
 
 
@@ -128,7 +132,7 @@ def fit(
 
 
 class _Descent(NamedTuple):
-    """The result of an iteration."""
+    """The end point of an iteration and the reason it ended."""
 
     point: Point
     blocks: Blocks

@@ -21,10 +21,10 @@ from .engine import (
 )
 
 
-# Number of updates of the initial states; parameter step, in scales, at which the
-# iteration ends
+# Maximum number of updates of the initial states, and change of the parameters (in
+# units of their scales) below which no further update is needed
 _ROUNDS, _SETTLED = 4, 1e-2
-# Maximum number of evaluations between two updates
+# Maximum number of evaluations of the residuals between two updates
 _EVALUATIONS = 40
 
 
@@ -39,7 +39,8 @@ class FreeRunFit:
     runs: tuple[FreeRun, ...]
     """The free run of each recording."""
     converged: bool
-    """Whether the search ended at an optimum near its start."""
+    """Whether the last update of the initial states left the optimum nearly unchanged.
+    """
 
 
 def fit_free_run(
@@ -153,7 +154,7 @@ def _slopes(ready: Sequence[tuple[Layout, Prepared]], scale, values):
 
 
 def _sound(numbers):
-    # a non-finite motion counts as a very large error
+    # the residuals of a motion that does not stay finite count as very large errors
     return np.nan_to_num(numbers, nan=1e12, posinf=1e12, neginf=-1e12)
 
 
@@ -163,7 +164,7 @@ def _off(layout: Layout, one: Prepared, values):
     found = simulated(model, restarted(model, one)).channels
     missed = (found - one.data) / one.noise[None]
     missed = jnp.where(jnp.isfinite(one.data), missed, 0.0)
-    # the samples from which the state was estimated do not count
+    # the samples from which the initial state was estimated do not count
     counts = jnp.arange(missed.shape[0]) >= one.samples
     return jnp.ravel(jnp.where(counts[:, None], missed, 0.0))
 

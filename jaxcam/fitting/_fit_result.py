@@ -106,7 +106,7 @@ class Fit:
         return self._table().html()
 
     def _table(self) -> ShortTable:
-        """Outcome and estimates of the fit."""
+        """Return a table of the outcome and the estimates."""
         count = (
             f"{self.problem.samples} samples, {len(self.problem.records)} recordings"
         )
@@ -249,7 +249,7 @@ def finish(
     prior,
     weights=None,
 ):
-    """Compute standard errors and collect the result."""
+    """Return the `Fit` at the end of an iteration, with standard errors."""
     information, _ = reduced(columns, blocks)
     known = np.diag(prior_information(problem, columns, prior))
     information = information + known

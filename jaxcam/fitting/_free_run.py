@@ -32,10 +32,10 @@ from .engine import (
 
 
 # Maximum number of Gauss-Newton steps for the initial state, and the relative decrease
-# of the cost below which they end
+# of the cost below which the iteration ends
 _NEWTON, _STILL = 20, 1e-12
-# Information, relative to that of the data, that keeps an unobserved component of the
-# initial state from moving
+# Regularisation of the initial state, relative to the information in the data: it keeps
+# an unobserved component unchanged
 _LEAST = 1e-12
 # Integration steps between two samples: initial and maximum number
 _FIRST_STEPS, _MOST_STEPS = 2, 64
@@ -156,10 +156,10 @@ def free_run(
 class Prepared(eqx.Module):
     """A recording prepared for a free run.
 
-    `state` `(n,)` at the first sample, estimated from the first `samples`; `start` and
-    `interval` (s): time of the first sample, and sampling interval; `level` `(k,)` of
-    the input; `data` `(k, c)` and their `noise` `(c,)`; the number of integration
-    `steps` between two samples.
+    `state` `(n,)` is the state at the first sample, estimated from the first `samples`;
+    `start` and `interval` (s) are the time of that sample and the sampling interval;
+    `level` `(k,)` is the input; `data` `(k, c)` are the samples, `noise` `(c,)` their
+    noise; `steps` is the number of integration steps between two samples.
     """
 
     state: Float[Array, " n"]
@@ -183,7 +183,7 @@ class Simulated(NamedTuple):
 
 
 def prepared(model: Model, recording: Recording | Segments, samples: int) -> Prepared:
-    """Return a recording with its initial state and enough integration steps.
+    """Return a recording prepared for a free run: initial state and enough steps.
 
     **Raises:** see `free_run`.
     """
@@ -302,7 +302,7 @@ def _started(model: Model, one: Prepared) -> Prepared:
         if not now < cost * (1 - _STILL):
             break
         cost = now
-        # columns scaled to unit length; an unobserved component does not move
+        # scale the columns to unit length; an unobserved component is not changed
         scale = np.linalg.norm(rows, axis=0)
         scale = np.where(scale > 0, scale, 1.0)
         state = state - np.linalg.lstsq(rows / scale, missed, rcond=None)[0] / scale
@@ -311,8 +311,8 @@ def _started(model: Model, one: Prepared) -> Prepared:
 
 @program
 def _off(model: Model, one: Prepared, state):
-    """Return residuals in units of the noise, and their derivatives with respect to the
-    initial state.
+    """Return the residuals in units of the noise, and their derivatives with respect to
+    the initial state.
     """
 
     def missed(state):
@@ -324,7 +324,7 @@ def _off(model: Model, one: Prepared, state):
 
 
 def restarted(model: Model, one: Prepared) -> Prepared:
-    """Return the recording with the initial state for another model, to first order.
+    """Return the recording with its state adapted to another model, to first order.
 
     The result is differentiable, so that a fit includes the dependence of the initial
     state on the parameters.

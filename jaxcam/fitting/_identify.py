@@ -17,7 +17,7 @@ from .engine import assemble, free_columns, Problem, reduced
 _SEEN = 0.5
 # A squared component of a direction that is below this may be due to rounding
 _ROUNDING = 1e-12
-# relative difference up to which two relative changes are equal
+# two relative changes that differ by less than this fraction count as equal
 _SAME = 0.05
 # members of a combination are named if they are at least this fraction of the largest
 _MEMBER = 0.15
@@ -63,7 +63,7 @@ class Identifiability:
         return int(np.sum(self.stderr < _SEEN))
 
     def sentences(self) -> list[str]:
-        """Return the report, one fact per sentence."""
+        """Return the result in words, one fact per sentence."""
         total = len(self.names)
         if not total:
             return ["There is nothing to fit."]
@@ -174,14 +174,15 @@ def identify(
             "its vector field, gap and impact at the nominal parameters for NaN."
         )
     values, vectors = np.linalg.eigh(information)
-    # values within rounding of zero are zero
+    # eigenvalues that are zero to within rounding are set to zero
     floor = np.finfo(float).eps * len(values) * max(np.max(values, initial=0.0), 0.0)
     values = np.where(values > floor, values, 0.0)[::-1]
     directions = vectors.T[::-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         stderr = 1 / np.sqrt(values)
         alone = 1 / np.sqrt(np.maximum(np.diag(information), 0.0))
-        # a direction about which nothing is known is itself affected by rounding
+        # a direction without information is itself accurate only to rounding, so its
+        # smallest components are set to zero
         dead = ~np.isfinite(stderr)[:, None]
         spread = np.where(dead & (directions**2 < _ROUNDING), 0.0, directions**2)
         weighted = np.where(spread > 0, spread * stderr[:, None] ** 2, 0.0)

@@ -13,19 +13,23 @@ from ._momentum import momentum_of, MomentumBalance
 from ._restitution import fit_rows, RestitutionFit
 
 
-# Smallest number of impacts for a law and its scatter
+# Minimum number of impacts from which a law and its scatter can be estimated
 _LEAST = 4
-# A row that deviates by more than this many standard deviations is an outlier
+# An impact that deviates from the law by more than this many standard deviations is an
+# outlier
 _MISREAD = 6.0
-# Probability that a constant coefficient appears to depend on the speed
+# Significance level of the F test: probability that a constant coefficient is taken for
+# one that depends on the speed
 _CHANCE = 0.01
-# If more than this fraction are outliers, none is excluded
+# If fewer than this fraction of the impacts would remain, no outlier is excluded
 _MAJORITY = 0.7
-# median of the absolute value of a Gaussian variable, in standard deviations
+# standard deviation of a Gaussian variable, divided by the median of its absolute value
 _MAD = 1.4826
-# Smallest ratio of speeds that shows a dependence of restitution on speed
+# Ratio of the highest to the lowest speed below which the table shows little about how
+# restitution depends on speed
 _RANGE = 1.5
-# Residuals of a constant law below this share of the squared scatter count as zero
+# A constant law whose mean squared residual is below this fraction of the squared
+# scatter counts as exact
 _NOTHING = 1e-4
 
 
@@ -73,7 +77,7 @@ class ImpactLaw:
         return self.laws[self.best]
 
     def sentences(self) -> list[str]:
-        """Return the law, its certainty, and remarks on the table."""
+        """Return sentences on the law and its certainty, and remarks on the table."""
         return [self._headline(), *self._caveats()]
 
     def _headline(self) -> str:
@@ -198,7 +202,7 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
     weights = _weights(table)
     every = np.ones(len(table), dtype=bool)
     kept = {name: _sound(table, one) for name, one in weights.items()}
-    # the same rows for each kind of scatter, so that the likelihoods are comparable
+    # the likelihoods are comparable only if every kind of scatter uses the same rows
     some = np.any(list(kept.values()), axis=0)
     kind = max(weights, key=lambda name: _likelihood(table, weights[name], some))
     keep = kept[kind]
@@ -208,7 +212,9 @@ def impact_law(table: ImpactTable) -> ImpactLaw:
 
 
 def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
-    """Return the relative scatter of the impacts, for each unit it may have."""
+    """Return the relative scatter of the impacts for each unit that `scatter_unit` may
+    have.
+    """
     if table.approach_stderr is None and table.separation_stderr is None:
         return {table.unit: np.ones(len(table)), "1": table.approach}
     r = float(np.median(table.separation / table.approach))
@@ -219,7 +225,7 @@ def _weights(table: ImpactTable) -> dict[str, Float[np.ndarray, " k"]]:
 
 
 def _fits(table: ImpactTable, errors, keep) -> dict[str, RestitutionFit]:
-    """Fit both laws to some of the impacts."""
+    """Fit both laws to the impacts selected by `keep`."""
     zero = np.zeros(len(table))
     rows = (zero, table.approach, table.separation, zero, errors, zero)
     data = np.stack(rows)[:, keep]
@@ -234,7 +240,7 @@ def _fits(table: ImpactTable, errors, keep) -> dict[str, RestitutionFit]:
 
 
 def _sound(table: ImpactTable, weights) -> Bool[np.ndarray, " k"]:
-    """Return the rows that are not outliers of the more general law."""
+    """Return whether each row fits the more general law, that is, is not an outlier."""
     every = np.ones(len(table), dtype=bool)
     typical = _typical(_off(table, np.median(_r(table))) / weights, table, weights)
     off = np.zeros(len(table))
@@ -245,7 +251,7 @@ def _sound(table: ImpactTable, weights) -> Bool[np.ndarray, " k"]:
 
 
 def _typical(off, table: ImpactTable, weights) -> float:
-    """Estimate the scatter robustly; for an exact table, it is that of rounding."""
+    """Return a robust estimate of the scatter; at least the size of rounding errors."""
     least = 1e-9 * float(np.max(table.separation / weights)) + 1e-300
     return max(_MAD * float(np.median(np.abs(off))), least)
 
@@ -277,7 +283,7 @@ def _off(table: ImpactTable, r):
 def _chosen(table: ImpactTable, kind: str, weights, keep) -> ImpactLaw:
     count = int(np.sum(keep))
     scale = 1.0
-    # the scatter is estimated about the more general law
+    # the scatter is estimated from the residuals of the more general law
     for _ in range(3):
         fits = _fits(table, weights * scale, keep)
         most = fits.get("power", fits["constant"])
@@ -290,7 +296,7 @@ def _chosen(table: ImpactTable, kind: str, weights, keep) -> ImpactLaw:
         direction = "falling" if power.values[1] > 0 else "rising"
         other = "rising" if direction == "falling" else "falling"
         laws[direction] = power
-        # if a constant law leaves no residual, there is no gain
+        # if the constant law is exact, the power law cannot improve the fit
         nothing = constant.cost <= _NOTHING * count
         ratio = 1.0 if nothing else constant.cost / max(power.cost, 1e-300)
         extra = float(np.log(count))

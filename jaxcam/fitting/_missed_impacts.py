@@ -12,16 +12,17 @@ from ._fit import fit
 from .engine import Model, Parameter, Problem, separated
 
 
-# A piece is doubted if its cost per sample exceeds this limit, and this multiple of the
-# upper quartile of all pieces, because the model may be incomplete
+# A piece is searched for an impact if its cost per sample exceeds both this limit and
+# this multiple of the upper quartile over all pieces; the second condition allows for a
+# model that fits no piece well
 _COST, _UNUSUAL = 3.0, 3.0
 _QUARTILE = 0.75
-# An impact is accepted if it explains at least this part of the excess cost
+# An impact is accepted if it explains at least this fraction of the excess cost
 _EXPLAINED = 0.5
-# or this part, if another impact is this close (s), because a soft contact bends the
-# motion
+# Fraction required instead if another impact is closer than this time (s), because a
+# soft contact may bend the motion there
 _COMPLETELY, _NEAR = 0.99, 0.01
-# Steps of a fit, which need not converge
+# Maximum number of iterations of a fit, which need not converge
 _STEPS = 12
 # Number of rounds; each finds at most one impact in a piece
 _ROUNDS = 4
@@ -30,8 +31,8 @@ Spans: TypeAlias = tuple[tuple[float, float], ...]
 
 
 class _Misfits(NamedTuple):
-    """Pieces of one recording: start and end (s), and the cost above its expectation,
-    in total and per sample.
+    """The pieces of one recording: start and end (s), and the excess of the cost over
+    its expected value, in total and per sample.
     """
 
     start: Float[np.ndarray, " k"]
@@ -46,14 +47,14 @@ def with_missed_impacts(
     segments: Sequence[Segments],
     again: Callable[[Sequence[Spans]], tuple[Segments, ...]],
 ) -> tuple[Segments, ...]:
-    """Return the segments with the impacts that they missed.
+    """Return the segments, supplemented by impacts that the segmentation missed.
 
-    A piece of flight that the model does not describe, in contrast to most others, may
-    contain an impact. An impact found there is accepted if it explains most of the
+    If the model describes most pieces of flight but not a particular one, that piece
+    may contain an impact. An impact found there is accepted if it explains most of the
     excess cost.
 
-    **Arguments:** `again` segments the recordings once more and seeks an impact in each
-    of the given time spans (s) of each recording.
+    **Arguments:** `again` is a function that repeats the segmentation and searches the
+    given time spans (s) of each recording for impacts.
     """
     segments = tuple(segments)
     accepted: list[Spans] = [() for _ in segments]
@@ -88,8 +89,8 @@ def with_missed_impacts(
 
 
 def _misfits(model, parameters, segments) -> list[_Misfits] | None:
-    """Fit each piece by itself, with the parameters that suit all of them, and return
-    the misfits of each recording, or None if the recordings cannot be fitted.
+    """Fit each piece separately, with parameters common to all pieces, and return the
+    misfits of each recording, or None if the recordings cannot be fitted.
     """
     try:
         problem = Problem.build(model, segments, parameters)
@@ -113,7 +114,9 @@ def _misfits(model, parameters, segments) -> list[_Misfits] | None:
 
 
 def _doubted(misfits: Sequence[_Misfits]) -> list[Spans]:
-    """Return the spans of pieces whose misfit is unusual; neighbours are joined."""
+    """Return the time spans of pieces with an unusual misfit; adjacent pieces are
+    joined.
+    """
     shares = np.concatenate([one.share for one in misfits])
     usual = 1 + max(0.0, float(np.quantile(shares, _QUARTILE))) if len(shares) else 1.0
     limit = max(_COST, _UNUSUAL * usual) - 1

@@ -38,7 +38,7 @@ class MomentumBalance:
         return not (size > _ERRORS * self.stderr and size > _SHARE)
 
     def sentence(self) -> str:
-        """Return the balance in words."""
+        """Return the momentum balance in words."""
         ratio = f"{self.ratio:.4g} +- {self.ratio_stderr:.1g}"
         if np.isnan(self.stated):
             return (

@@ -35,7 +35,7 @@ _TABLES = (
     "records",
     *LAYOUT_KEYS,
 )
-# keys of one entry of `[parameters]`
+# Keys that one entry of `[parameters]` may have
 _NUMBER = ("value", "tolerance", "lower", "upper", "unit")
 
 
@@ -143,7 +143,9 @@ def _class(file: Path, tables, system) -> type[HybridSystem]:
 
 
 def _parameters(file: Path, tables) -> Iterator[tuple[str, _Stated]]:
-    """Read the entries of `[parameters]`, with dotted names for parts."""
+    """Read the entries of `[parameters]`; fields of a part of the system have dotted
+    names.
+    """
     if "parameters" not in tables:
         return
     section = Section(file, "parameters", tables)
@@ -208,10 +210,10 @@ def _parameter(name: str, one: _Stated) -> Parameter:
 def _records(
     file: Path, tables, system: HybridSystem, taken: set[str]
 ) -> dict[str, dict[str, float]]:
-    """Read the constants of recordings, by patterns of their names.
+    """Read the constants of recordings, keyed by patterns of recording names.
 
-    **Arguments:** `taken` contains the numbers that are fitted or measured by a
-    channel.
+    **Arguments:** `taken` contains the names of fields that are fitted or follow a
+    measured channel.
     """
     if "records" not in tables:
         return {}
@@ -238,8 +240,8 @@ def _entries(section: Section) -> Iterator[tuple[str, None]]:
 
 
 def _phase_of(drive: Turning | Input | None) -> str | None:
-    """Return the phase field of a rotating drive, which represents the encoder's
-    zero.
+    """Return the name of the phase field of a rotating drive; the field is the offset
+    of the drive angle from the encoder reading.
     """
     if not isinstance(drive, Turning):
         return None
@@ -250,8 +252,8 @@ def _phase_of(drive: Turning | Input | None) -> str | None:
 def _drive(
     file: Path, tables
 ) -> tuple[Turning | Input | None, str | None, dict[str, float]]:
-    """Return the drive, its channel if it turns, and the values of its fields at
-    rest.
+    """Return the drive, the channel of its encoder if it rotates, and default values of
+    the fields of the system that it controls.
     """
     if "drive" in tables and "input" in tables:
         raise RigError(

@@ -176,9 +176,9 @@ def fit_rows(
 ) -> RestitutionFit:
     """Fit parameters of a law to impacts given as arrays.
 
-    **Arguments:** speed of the drive, approach speed, separation speed, and the
-    standard errors of approach, separation and surface speed; law and names as for
-    `fit_restitution`.
+    **Arguments:** the rows of `data` are the speed of the drive, the approach speed,
+    the separation speed, and the standard errors of the approach, separation and
+    surface speeds; `law` and `names` are those of `fit_restitution`.
     """
     names = tuple(names)
     start = np.array([float(getattr(law, name)) for name in names])
@@ -205,7 +205,7 @@ def _with(law, names, values):
 
 
 def _misfit(values, data, law, names):
-    """Return the misfit in standard errors, `(k,)`."""
+    """Return the misfit of each impact in standard errors, `(k,)`."""
     speed, approach, separation, before, after, surface = data
     changed = _with(law, names, values)
     r = jax.vmap(changed)(speed, approach)
@@ -295,7 +295,7 @@ def first_bounce(
 @program
 def _speed_for_height(system, angle, duration, height) -> Array:
     """Find the separation speed of a flight of this `height` by bisection."""
-    # the gap is the angle of the follower minus that of contact with the cam
+    # the gap is the follower angle minus the contact angle
     contact = angle - system.gap(jnp.asarray(0.0), jnp.stack([angle, 0.0 * angle]))
     start = jnp.stack([contact, jnp.zeros_like(contact)])
     zero = jnp.zeros_like(contact)
@@ -326,7 +326,7 @@ def _speed_for_height(system, angle, duration, height) -> Array:
         short = top(middle) < height
         return jnp.where(short, middle, low), jnp.where(short, high, middle)
 
-    # upper bound of the speed from the height
+    # upper bound of the speed: twice that of a parabola with this height and duration
     high = 8 * height / duration + 1e-9
     low, high = jax.lax.fori_loop(0, 40, halve, (zero, high + zero))
     return (low + high) / 2

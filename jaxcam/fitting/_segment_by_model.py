@@ -24,7 +24,7 @@ from .engine import (
 )
 
 
-# Samples at which the dependence of a gap on the state is evaluated
+# Number of samples at which the dependence of a gap on the state is evaluated
 _LOOKS = 64
 
 
@@ -104,7 +104,9 @@ def segment_by_model(
 
 
 class _ShownGaps(NamedTuple):
-    """The gaps that the channels determine `(g, k)`, and their errors `(g,)`."""
+    """The gaps that can be computed from the channels, `(g, k)`, and their errors
+    `(g,)`.
+    """
 
     gaps: Float[np.ndarray, "g k"]
     errors: Float[np.ndarray, " g"]
@@ -144,7 +146,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
 
 
 def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
-    """Return the measured components of the state, zero elsewhere."""
+    """Return the state at each sample; components that are not measured are zero."""
     size = size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
     states = np.zeros((len(recording), size))
     for place, name in picks.items():
@@ -155,8 +157,8 @@ def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
 
 
 def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
-    """Return gaps `(g, k)`, their derivatives with respect to the state `(g, n)` and
-    their errors `(g,)`.
+    """Return the gaps `(g, k)`, the largest magnitudes of their derivatives with
+    respect to the state `(g, n)`, and their errors `(g,)`.
     """
     layout = Layout(model, parameter_places(model, parameters))
     values = np.array([float(p.where(model)) for p in parameters])
@@ -174,7 +176,8 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
     by_state, by_value = (np.asarray(x) for x in _slopes(layout, values, *looks))
     slopes = np.max(np.abs(by_state), axis=0)
     moved = np.max(np.abs(by_value), axis=0)
-    # an unknown component must not give zero times infinity
+    # a parameter that does not affect a gap and has no tolerance must not give zero
+    # times infinity
     parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
     return gaps, slopes, np.sum(parts, axis=-1)
 

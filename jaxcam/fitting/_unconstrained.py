@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 
-# Fractions of the largest singular value, with columns of unit length, below which a
-# combination is certainly, or possibly, due to rounding
+# Fractions of the largest singular value (of a Jacobian with columns of unit length)
+# below which the information on a combination is certainly, or possibly, due to
+# rounding
 _BLIND, _DOUBTFUL = 4e-6, 3e-3
 # A combination whose information grows by more than this factor if the eliminated
 # states are regularised a hundred times as strongly is not determined by the data
@@ -50,11 +51,12 @@ def unconstrained(
     scale: Float[np.ndarray, " g"],
     firmer: Callable[[], Float[np.ndarray, "g g"]],
 ) -> tuple[Unconstrained, ...]:
-    """Find unconstrained combinations: right singular vectors of the Jacobian.
+    """Find unconstrained combinations of parameters from the Jacobian of the data.
 
-    The eigenvectors of the information J^T J are the right singular vectors of the
-    Jacobian J, and its eigenvalues are the squares of the singular values. The columns
-    of J are first scaled to unit length.
+    Unconstrained combinations are right singular vectors of the Jacobian J with nearly
+    zero singular values. They are found as eigenvectors of the information J^T J, whose
+    eigenvalues are the squares of the singular values of J. The columns of J are first
+    scaled to unit length.
 
     **Arguments:** names and `information` of the parameters in units of their `scale`;
     `firmer` returns the same matrix with a stronger regularisation of the eliminated
@@ -77,7 +79,7 @@ def unconstrained(
         )
         for value, vector in zip(values, vectors.T):
             rounding = value <= _BLIND**2 * len(rows) * values[-1]
-            # a state that only rounding errors determine appears to give information
+            # a state determined only by rounding errors appears to provide information
             lent = vector @ held @ vector > _GROWS * max(value, 0.0)
             if not (rounding or (value <= _DOUBTFUL**2 * values[-1] and lent)):
                 continue

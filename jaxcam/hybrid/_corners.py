@@ -1,4 +1,4 @@
-"""Find corners and jumps in the functions of a system, by reading their programs."""
+"""Find corners and jumps in the functions of a system, from their traced programs."""
 
 import dataclasses
 from collections.abc import Callable, Iterator
@@ -34,7 +34,8 @@ _CORNERS = {
     "sort": "sort",
     "while": "while_loop",
 }
-# compiled functions of `jax.numpy`: a corner in one is reported at the line of its call
+# compiled functions of `jax.numpy`: a corner inside one of them is reported under the
+# name of the function, at the line where it is called
 _NUMPY = {
     "_where": "where",
     "clip": "clip",
@@ -45,7 +46,7 @@ _NUMPY = {
     "round": "round",
     "trunc": "trunc",
 }
-# folders with code that is not the user's
+# folders of libraries, whose code is not the user's
 _LIBRARIES = tuple(f"/site-packages/{name}/" for name in ("jax", "jaxlib", "equinox"))
 
 
@@ -124,7 +125,7 @@ def corners(system: HybridSystem, state: VectorLike) -> list[Corner]:
 
 @no_type_check
 def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield operations with a corner and their places.
+    """Yield the name, file and line of each operation with a corner.
 
     **Arguments:** the program; which of its arguments depend on time or state; and, for
     operations inside a function of `jax.numpy`, the name and place of its call.
@@ -155,7 +156,7 @@ def _is_corner(equation, name, moves) -> bool:
     if name == "cond":
         return moves[0]
     if name == "convert_element_type":
-        # a condition used as a number
+        # a condition that is converted to a number jumps from 0 to 1
         return equation.invars[0].aval.dtype == bool
     if name in ("max", "min", "abs", "sign", "sort"):
         return jnp.issubdtype(equation.outvars[0].aval.dtype, jnp.inexact)
@@ -175,7 +176,7 @@ def _inside(equation):
 
 
 def _place(equation: Any) -> tuple[str, int]:
-    """Return file and line of the innermost call that is not inside a library."""
+    """Return the file and line of the innermost call that is not inside a library."""
     trace = equation.source_info.traceback
     for frame in trace.frames if trace is not None else ():
         name = frame.file_name.replace("\\", "/")

@@ -1,4 +1,4 @@
-"""Count the events of a motion, for programs that do not list them."""
+"""Count the events of a motion, for runs that do not list each event."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -8,7 +8,7 @@ from .codes import RowKind
 
 
 class EventCounts(eqx.Module):
-    """Numbers of events of a motion, as floats.
+    """The numbers of events of a motion so far, as floats.
 
     The impacts of a complete chatter sequence count as one contact.
     """
@@ -26,7 +26,7 @@ class EventCounts(eqx.Module):
 
     @staticmethod
     def zero() -> "EventCounts":
-        """Return the numbers at the start."""
+        """Return the numbers at the start of a motion, all zero."""
         return EventCounts(*(jnp.zeros(()) for _ in range(5)))
 
     def after(self, kind: Float[Array, ""]) -> "EventCounts":

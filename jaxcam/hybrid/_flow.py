@@ -21,7 +21,7 @@ from .lowering import depend_on, one_kernel, whole, with_kept
 from .programs import is_traced, is_tracing
 
 
-# iterations between two checks of whether any batch element is still running
+# number of iterations between two checks of whether a batch element is still running
 _BLOCK = 4
 
 

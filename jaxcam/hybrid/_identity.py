@@ -12,8 +12,8 @@ from ._system import HybridSystem
 
 
 def structure_of(system: HybridSystem) -> Hashable | None:
-    """Return everything that determines the programs of a system; `None` if it is not
-    hashable.
+    """Return a key of everything that determines the compiled programs of a system, or
+    `None` if the key would not be hashable.
     """
     arrays, rest = eqx.partition(system, eqx.is_array)
     shapes = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(arrays))
@@ -27,7 +27,7 @@ def structure_of(system: HybridSystem) -> Hashable | None:
 
 
 def digest_of(system: HybridSystem) -> bytes:
-    """Return a hash of all numbers of a system."""
+    """Return a hash of the values of all arrays of a system."""
     found = hashlib.blake2b(digest_size=16)
     for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)):
         if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):

@@ -12,7 +12,7 @@ _LATEST, _READY = Latest(), Cache(64)
 
 
 def prepared(system: HybridSystem) -> HybridSystem:
-    """Return the prepared system."""
+    """Return `system.prepared()`, from a cache if possible."""
     if type(system).prepared is HybridSystem.prepared:
         return system
     latest = _LATEST.get(system)

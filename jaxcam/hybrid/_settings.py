@@ -81,14 +81,14 @@ class Settings(eqx.Module):
 
     @property
     def compiles(self) -> bool:
-        """Return whether LLVM compiles a run that is not traced."""
+        """Return whether runs that are not traced are compiled by LLVM."""
         if self.plain or self.backend == "xla":
             return False
         return self.demands or jax.default_backend() == "cpu"
 
     @property
     def demands(self) -> bool:
-        """Return whether it is an error if LLVM cannot compile a run."""
+        """Return whether a run that LLVM cannot compile raises an error."""
         return self.backend in ("llvm", "cuda")
 
     @property

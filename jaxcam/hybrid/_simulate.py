@@ -117,7 +117,7 @@ def simulate(
     tableau_of(settings.solver)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps
-        # a scan can be differentiated in reverse step by step, a loop only as a whole
+        # a scan is differentiated in reverse mode step by step, a loop only as a whole
         forward = _forward if settings.plain else whole(_forward)
         of_rows: Callable[..., tuple[Parts, Any]] = (
             _reversible if derivatives == "reverse" else forward
@@ -132,7 +132,7 @@ def simulate(
         )
         parts = _assemble(system, t_start, state, mode, log, settings.compiles)
     if int(code) in (BEHIND, NOT_FINITE):
-        # the loop has found out, but does not say by how much
+        # the loop returns only the code; the error states the value of the gap
         check_gaps(system, settings, t_start, state)
     return _trajectory(system, settings, t0, t1, _trim(parts), code)
 
@@ -140,7 +140,7 @@ def simulate(
 def _by_diffeqsolve(
     system, settings, t0, state, t1, max_steps, progress, traced
 ) -> tuple[Parts, Any]:
-    """Return parts and result code of a run with one diffrax call per piece."""
+    """Return the parts and the result code of a run by diffrax, piece by piece."""
     if isinstance(system, SwitchedSystem):
         raise ValueError(
             'engine="diffeqsolve" does not support switching surfaces; use '
@@ -179,7 +179,7 @@ def _chosen(settings, tolerance, solver, max_step) -> Settings:
 
 
 def _released(system, t0, traced):
-    """Return the start of the orbit that was last released before t0."""
+    """Return the state and time of the last release before t0."""
     if not traced:
         system.check()
     if system.period is None:
@@ -210,8 +210,8 @@ def _constraints(system, t0) -> int:
 
 @program
 def _release_point(system, t0):
-    """Return the state (NaN without a release), the time, and whether there is no
-    release.
+    """Return the state and time of the last release, and whether there is none; the
+    state is then NaN.
     """
     point = release_point(system, t0)
     nowhere = point.holds == 2
@@ -221,19 +221,19 @@ def _release_point(system, t0):
 def _forward(
     system, settings, t0, state, t1, rows: int
 ) -> tuple[Parts, Int[Array, ""]]:
-    """Return parts and result code of a run whose arrays have fixed lengths."""
+    """Return the parts and the result code of a run with arrays of fixed lengths."""
     return _of_rows(run, system, settings, t0, state, t1, rows)
 
 
 def _reversible(system, settings, t0, state, t1, rows: int):
-    """Run the same loop as a scan."""
+    """Return the same as `_forward`, from a scan instead of a loop."""
     return _of_rows(run_reversible, system, settings, t0, state, t1, rows)
 
 
 def _of_rows(runner, system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, True)
     mode = jnp.stack(carried.mode)
-    # an invalid start is not integrated
+    # with an invalid start, all states are NaN
     valid = (carried.status == RUNNING) | (carried.status == PAINLEVE)
     state = jnp.where(valid, state, jnp.nan)
     carried, log = runner(functions, plan, carried, rows)
@@ -241,19 +241,19 @@ def _of_rows(runner, system, settings, t0, state, t1, rows):
 
 
 def _assemble(system, t0, state, mode, log: Log, compiles: bool = False) -> Parts:
-    """Assemble the parts of a run that is not traced."""
+    """Return the parts of a trajectory from the log of a run that is not traced."""
     t0, state, mode, log = jax.tree.map(np.asarray, (t0, state, mode, log))
     system = prepared(system)
     log = Log(*(part[log.kind > 0] for part in log))
     rows, width = log.mode.shape
-    # contacts at the start do not belong to any row
+    # contacts that exist at the start do not belong to any row of the log
     sizes = rows, width * (rows + 1)
     return assemble(system, t0, state, mode, log, sizes, np, compiles=compiles)
 
 
 @jax.jit
 def _code(carried: LoopState):
-    """Return the index into `RESULTS`; an unfinished run has used up its steps."""
+    """Return the index into `RESULTS`: `RUNNING` if the run has used up its steps."""
     return carried.status.astype(jnp.int32)
 
 

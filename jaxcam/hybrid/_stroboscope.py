@@ -21,9 +21,10 @@ from .record import Printed, vector_text
 from .surface import check_restitution, restitutions
 
 
-# ratio of trajectories in a group to those in a block
+# ratio of the number of trajectories in a group to that in a block
 _GROUP = 64
-# on a GPU, which runs very many trajectories at once: numbers in the samples of a group
+# on a GPU, which runs very many trajectories at once, a group has so many trajectories
+# that their samples consist of about this many numbers
 _ON_GPU = 2**27
 
 
@@ -74,7 +75,7 @@ class Stroboscope(Printed):
             f"trajectories: {len(rows)}, failed: {failed}, "
             f"samples of each: {self.states.shape[1]}"
         )
-        # the last column is shown only if there is something to report
+        # the column of failures is shown only if a trajectory has failed
         if not failed:
             headings, rows = headings[:-1], [row[:-1] for row in rows]
         return ShortTable(said, headings, rows, ("failure",))
@@ -182,9 +183,10 @@ def stroboscope(
 
 
 def _group(lanes: int, width: int, workers: int, least: int) -> int:
-    """Return the number of trajectories in a group, which bounds the memory.
+    """Return the number of trajectories in a group, at least `least`.
 
-    The block is full until the last trajectories of the group.
+    The size of a group limits the memory required. Within a group, the block stays full
+    until only the last trajectories remain.
     """
     shares = -(-lanes // (workers * width))
     return max(width * min(_GROUP, shares), least)

@@ -1,4 +1,4 @@
-"""Run the loop outside of traces, chunk by chunk, with LLVM or XLA."""
+"""Run the event loop outside of JAX transformations, in chunks, with LLVM or XLA."""
 
 from collections.abc import Callable
 from typing import Any
@@ -24,16 +24,17 @@ from .loop import (
 )
 
 
-# rows of a chunk; between chunks, progress is shown and a run can be interrupted
+# number of attempted steps in a chunk; between chunks, progress is reported and a run
+# can be interrupted
 _CHUNK = 2048
 
 
 def run_untraced(
     system, settings, t0, state, t1, budget: int, progress: Callable | None
 ) -> tuple[Log, Any, Int[Array, ""]]:
-    """Return log, initial mode and result code of a run of at most `budget` rows.
+    """Return the log, the initial mode and the result code of a run.
 
-    A run that has not ended after `budget` rows has the code `RUNNING`.
+    A run that has not ended after `budget` attempted steps has the code `RUNNING`.
     """
     case = system, settings, t0, state, t1
     if settings.compiles:
@@ -45,7 +46,7 @@ def run_untraced(
 
 
 def prepare(system, settings, t0, state, t1, differentiable):
-    """Return the functions, the plan and the first state of a run."""
+    """Return the functions, the plan and the first loop state of a run."""
     return _started(system.prepared(), settings, t0, state, t1, differentiable)
 
 
@@ -63,7 +64,7 @@ def _said(progress, t, t0, t1) -> None:
 
 
 def _start(case, _=None):
-    """Return the plan and the first state of a run of a prepared system."""
+    """Return the plan and the first loop state of a run of a prepared system."""
     _, plan, carried = _started(*case, differentiable=False, shared=True)
     return plan, jax.tree.map(jnp.asarray, carried)
 

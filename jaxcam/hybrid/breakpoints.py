@@ -1,16 +1,17 @@
 """Handle declared times of abrupt change: no step reaches across one.
 
 Between two such times, the functions are evaluated strictly inside the interval, so a
-switch at the time itself may be written with `<` or `<=`. Any other time is used
-unchanged: a shift by rounding would move a wall away from a detected impact.
+switch at the time itself may be written with `<` or `<=`. Times that are not close to a
+breakpoint are used unchanged, because even a shift of the order of rounding would move
+a wall away from a detected impact.
 """
 
 import jax
 import jax.numpy as jnp
 
 
-# distance from a breakpoint at which functions are evaluated, relative to the time:
-# more than the rounding of a phase computed from it
+# smallest distance from a breakpoint at which functions are evaluated, as a fraction of
+# the time: more than the rounding error of a phase computed from the time
 _SIDE = 2e-15
 
 

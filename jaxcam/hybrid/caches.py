@@ -12,7 +12,7 @@ _ALL: "weakref.WeakSet[Cache | Latest]" = weakref.WeakSet()
 
 
 class Cache:
-    """Results by their keys; beyond a maximum number, the oldest are discarded.
+    """A cache of results by key; beyond a maximum number, the oldest are discarded.
 
     **Arguments:** the maximum number of results.
     """
@@ -25,8 +25,8 @@ class Cache:
         _ALL.add(self)
 
     def get(self, key: Hashable, make: Callable[[], Any], keeps=lambda made: True):
-        """Return the result for a key. If there is none yet, it is made, and kept if
-        `keeps(result)`.
+        """Return the result for a key. If there is none yet, `make` creates one, which
+        is kept if `keeps(result)` is true.
 
         **Raises:** `TypeError` if the key is not hashable.
         """
@@ -57,19 +57,19 @@ class Cache:
 
 
 class Latest:
-    """The latest result, for an object that is passed again."""
+    """A cache of one result, for an object that is passed several times in a row."""
 
     def __init__(self):
         self._latest: tuple[Any, Any] = (None, None)
         _ALL.add(self)
 
     def get(self, one: object) -> Any:
-        """Return the result for an object, or `None` if it is not the latest one."""
+        """Return the result kept for this very object, or `None` if there is none."""
         latest, result = self._latest
         return result if latest is one else None
 
     def keep(self, one: object, result: Any) -> None:
-        """Keep the result for an object in place of the one before."""
+        """Keep the result for an object, and discard the previous result."""
         self._latest = (one, result)
 
     def clear(self) -> None:

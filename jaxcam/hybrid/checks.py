@@ -33,7 +33,7 @@ def refuse_tracers(name: str, instead: str, *arguments) -> None:
 
 
 def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
-    """Raise `ValueError` for a start that cannot be simulated."""
+    """Raise `ValueError` if an argument is invalid or the run cannot start."""
     check_arguments(system, settings, t0, state, t1)
     check_gaps(system, settings, t0, state)
 
@@ -66,7 +66,7 @@ def check_arguments(system: HybridSystem, settings: Settings, t0, state, t1) -> 
 
 
 def check_gaps(system: HybridSystem, settings: Settings, t0, state) -> None:
-    """Raise `ValueError` for a state that penetrates a constraint, or whose gaps are
+    """Raise `ValueError` for a state that penetrates a constraint, or at which a gap is
     not finite.
     """
     case = prepared(system), t0, state
@@ -80,13 +80,13 @@ def check_gaps(system: HybridSystem, settings: Settings, t0, state) -> None:
         )
 
 
-# functions of (system, time, state)
+# compiled functions of (system, time, state)
 _STARTS_BEHIND = Rowwise(lambda case, _: starts_behind(*case), width=1)
 _RESTITUTIONS = Rowwise(lambda case, _: restitutions(*case), width=1)
 
 
-# systems that have passed the checks, by their shapes and by all their numbers; they
-# are not checked again, because a check takes as long as a short run
+# keys of systems that have passed the checks: of shapes alone, and of all numbers. Such
+# systems are not checked again, because a check takes as long as a short run
 _WELL_SHAPED: set = set()
 _SOUND: set = set()
 _MANY = 1000
@@ -164,7 +164,9 @@ def _check_shapes(system, t0, state) -> None:
 
 
 def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
-    """Check and return the shapes of the results of functions of switching surfaces."""
+    """Check the shapes that the methods for switching surfaces return, and return these
+    shapes by the name of the method.
+    """
     switch = _shape(system, "switching", t0, state)
     if len(switch.shape) > 1 or switch.shape == (0,):
         raise ValueError(
@@ -197,7 +199,7 @@ def _switched_shapes(system: SwitchedSystem, t0, state) -> dict:
 
 
 def _shape(system, name, *arguments):
-    """Return shape and type of the result of a user's function."""
+    """Return the shape and type of the result of a method of the system."""
     try:
         made = jax.eval_shape(getattr(system, name), *arguments)
     except (ConcretizationTypeError, TracerArrayConversionError) as error:

@@ -7,12 +7,13 @@ import equinox as eqx
 
 
 class RowKind(enum.IntEnum):
-    """The kind of one row of the log."""
+    """The kind of event, or step, that a row of the log describes."""
 
     NOTHING = 0
     STEP = 1
     IMPACT = 2
-    # the impact after which the infinitely many remaining ones are summed
+    # the last simulated impact of a complete chatter; the infinitely many remaining
+    # impacts are completed by a formula
     LAST_IMPACT = 3
     CONTACT = 4
     RELEASE = 5

@@ -43,8 +43,8 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
         The compiled function.
     """
     jitted: Any = eqx.filter_jit
-    # JAX rejects options within other transformations, from which a function may have
-    # captured values
+    # JAX rejects compiler options within other transformations; the arguments do not
+    # reveal these, because a function may have captured traced values
     inner, outermost = jitted(function), jitted(function, compiler_options=_OPTIONS)
 
     @functools.wraps(function)

@@ -20,7 +20,7 @@ from .lowering import while_loop
 
 
 class Tableau(NamedTuple):
-    """Coefficients as plain numbers; zeros are skipped when the step is unrolled."""
+    """Coefficients of a method as plain numbers; an unrolled step skips zeros."""
 
     lower: tuple[tuple[float, ...], ...]
     """Coefficients of the stages, one row per stage after the first."""
@@ -83,7 +83,7 @@ error estimate.
 
 
 class Squared(NamedTuple):
-    """Coefficients of a component whose rate is another component, y'' = f.
+    """Coefficients for a component y whose rate is another component, so that y'' = f.
 
     The stages of y are y + c h y' + h^2 times the sum of `lower` times f. They do not
     use the stages of y', which are needed only if f depends on y'.
@@ -108,7 +108,7 @@ def squared(tableau: Tableau) -> Squared:
     a = _lower(tableau)
     lower = a @ a
     rows = np.vstack([lower, np.asarray(tableau.weights) @ a, tableau.error @ a])
-    # sums that should vanish by the order conditions are left with rounding errors
+    # sums that vanish by the order conditions are nonzero only because of rounding
     rows[np.abs(rows) < 1e-14] = 0.0
     *stages, weights, error = (tuple(map(float, row)) for row in rows)
     return Squared(tuple(stages[1:]), weights, error)
@@ -168,8 +168,8 @@ def rates_among(x, rates) -> dict[int, int]:
         for j, component in enumerate(x):
             if rate is component and i != j:
                 found[i] = j
-    # a component whose rate also has its rate among the components is integrated
-    # directly, because otherwise there would be a third level
+    # a component whose second derivative is also a component is integrated directly,
+    # because otherwise there would be a third level
     return {i: j for i, j in found.items() if j not in found}
 
 
@@ -225,15 +225,15 @@ def array_step(
         rows = (jnp.arange(len(tableau.nodes)), lower, nodes)
         rates, _ = jax.lax.scan(stage, empty, rows)
     else:
-        # each stage needs only the previous one, so less is carried along
+        # each stage needs only the previous one, so the scan carries only that one
         shares = jnp.asarray([0.0, *(row[-1] for row in tableau.lower)])
         _, rates = jax.lax.scan(chained, jnp.zeros_like(x), (shares, nodes))
     return x + h * _weighted(weights, rates), h * _weighted(wrong, rates), rates[0]
 
 
 def _weighted(weights, rates):
-    """Return the weighted sum of the stages, not by a matrix product, which is slower
-    with derivatives.
+    """Return the weighted sum of the stages; a matrix product would be slower to
+    differentiate.
     """
     return jnp.sum(weights[:, None] * rates, axis=0)
 

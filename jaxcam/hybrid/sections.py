@@ -46,7 +46,7 @@ class WithSection(SwitchedSystem):
         return jnp.append(own, jnp.where(self.function(t, state) >= 0, 1.0, -1.0))
 
     def reset(self, t, state, sides):
-        """Return the states after resets of the system, then the unchanged state."""
+        """Return the states after the system's resets, then the unchanged state."""
         if not isinstance(self.system, SwitchedSystem):
             return state[None]
         own = jnp.atleast_2d(self.system.reset(t, state, sides[:-1]))
@@ -57,7 +57,7 @@ class WithSection(SwitchedSystem):
         return self.system.gap(t, state)
 
     def impact(self, t, state):
-        """Return the states after impacts of the system."""
+        """Return the states after the impacts of the system."""
         return self.system.impact(t, state)
 
     @property
@@ -83,7 +83,7 @@ class WithSection(SwitchedSystem):
 
     @property
     def restitution_kind(self):
-        """Return the kind of the coefficient of restitution of the system."""
+        """Return the meaning of the coefficient of restitution of the system."""
         if isinstance(self.system, SwitchedSystem):
             return self.system.restitution_kind
         return "kinematic"
@@ -121,7 +121,7 @@ class WithSection(SwitchedSystem):
         return otherwise
 
     def _each(self, name: str, of_section: float):
-        """Return a value for each surface of the system, then that of the section."""
+        """Return the named value for each surface of the system, then `of_section`."""
         if not self.number:
             return of_section
         own = jnp.asarray(getattr(self.system, name), dtype=jnp.float64)

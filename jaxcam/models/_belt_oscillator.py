@@ -77,7 +77,8 @@ class BeltOscillator(FilippovSystem):
 
     def _pulled(self, t, state, side):
         x, velocity = state[0], state[1]
-        # smooth beyond the surface: on this side, the slip has the sign -side
+        # `side` is 1 while the mass is slower than the belt and -1 while it is faster;
+        # the magnitude of the slip is continued smoothly beyond the surface
         slip = -side * (velocity - self.belt)
         force = side * self.friction / (1 + self.weakening * slip)
         drive = self.amplitude * jnp.cos(self.omega * t)

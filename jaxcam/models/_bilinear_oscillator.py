@@ -19,10 +19,10 @@ class BilinearOscillator(SwitchedSystem):
 
     `x'' + 2 damping x' + k(x) = amplitude cos(omega t)`; the state is (x, x'). The
     restoring force is k = x up to the stop, and k = x + (stiffness - 1) (x - stop)
-    beyond it. For a free, undamped motion and a stop at zero, the half periods on the
-    two sides are pi and pi / sqrt(stiffness). For infinite stiffness, the stop is the
-    rigid wall of [`jaxcam.models.ImpactOscillator`][] with a coefficient of restitution
-    of one.
+    beyond it. For free, undamped motion and a stop at zero, the half periods on the two
+    sides are pi and pi / sqrt(stiffness). For infinite stiffness, the stop is the rigid
+    wall of [`jaxcam.models.ImpactOscillator`][] with a coefficient of restitution of
+    one.
 
     S. W. Shaw, P. J. Holmes, A periodically forced piecewise linear oscillator, Journal
     of Sound and Vibration 90 (1983), 129-155.

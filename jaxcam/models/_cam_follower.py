@@ -84,8 +84,8 @@ class CamFollower(AbstractCamDriven):
         """
         del t
         angle, velocity = state[0], state[1]
-        # only one sine and one cosine, because this is evaluated in every Runge-Kutta
-        # stage
+        # this uses only one sine and one cosine, because it is evaluated in every
+        # Runge-Kutta stage
         sine, cosine = jnp.sin(angle), jnp.cos(angle)
         secant = 1 / cosine
         stretch = self._reach(sine, secant) - self.spring_elongation
@@ -149,5 +149,6 @@ class CamFollower(AbstractCamDriven):
         self.check_cam()
 
     def _reach(self, sine, secant):
-        # x_A tan(theta) + d / cos(theta), the end of the spring on the follower
+        # x_A tan(theta) + d / cos(theta), the position of the spring's end on the
+        # follower
         return (self.spring_hook_x * sine + self.spring_half_height) * secant

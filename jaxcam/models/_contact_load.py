@@ -15,8 +15,8 @@ from .cams import flat_oscillating_contour, MotionPieces, MotionProgram, profile
 _TURN = 2 * np.pi
 _SAMPLES = 1025
 _HALVINGS = 60
-"""Number of golden-section iterations, which reduce two steps of the scan to rounding
-error.
+"""Number of golden-section iterations, which shrink an interval of two scan steps to
+rounding error.
 """
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -147,7 +147,8 @@ def float_speed(system: CamFollower | ValveTrain) -> FloatSpeed:
     refined = (low + high) / 2
     coarse = angles.reshape(-1)[best]
     better = speed_at(piece, refined) < speed_at(piece, coarse)
-    # the position of a minimum is held fixed when its value is differentiated
+    # a shift of the minimum does not change its value to first order, so its position
+    # is not differentiated
     angle = jax.lax.stop_gradient(jnp.where(better, refined, coarse))
     speed = speed_at(piece, angle)
     fall, where = _sharpest_fall(system.profile)

@@ -21,14 +21,14 @@ _TURN = 2 * np.pi
 _NEAR = 4e-12
 """Tolerance of gap and velocity in contact, relative to the size of the state."""
 _BEHIND = 2e-4
-"""Penetration depth at which a body that moves into the surface is placed, in units of
-the tolerance.
+"""Depth below the surface at which a body that moves into the surface is placed, in
+units of the tolerance of the gap.
 """
 _Part = TypeVar("_Part", Impacts, Contacts, Steps)
 
 
 class OnePiece(CamProfile):
-    """One piece of a program, continued smoothly beyond its ends."""
+    """One piece of a motion program, continued smoothly beyond its ends."""
 
     pieces: MotionPieces
     middle: jax.Array = parameter()
@@ -111,7 +111,7 @@ def simulate_through_joints(
 
 
 def _joint_times(system, angles, t0, t1):
-    """Return t0, the times of the joints in between, and t1."""
+    """Return t0, the times of the joints between t0 and t1, and t1."""
     first = float(system.cam_angle(0.0))
     rate = float(system.cam_angle(1.0)) - first
     turned = first + rate * np.array([t0, t1])

@@ -204,7 +204,7 @@ class WoodpeckerToy(SwitchedSystem):
 
     @property
     def _inverse(self) -> jax.Array:
-        """Inverse of the mass matrix, shape `(3, 3)`, by its cofactors."""
+        """Inverse of the mass matrix, shape `(3, 3)`, computed from its cofactors."""
         bird, first, second = self.bird_mass, self.spring_offset, self.bird_offset
         a, b, c = self.sleeve_mass + bird, bird * first, bird * second
         d, e = self.sleeve_inertia + bird * first**2, bird * first * second

@@ -167,7 +167,7 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
         with np.errstate(all="ignore"):
             system.check()
     except _MISFITS:
-        # a string instead of a number, or a list instead of a law
+        # raised for a string instead of a number, or a list instead of a law
         raise ValueError(_MISFIT.format("system")) from None
     return system
 
@@ -227,7 +227,7 @@ def _decode(found: Any, known: dict[str, type], place: str) -> Any:
     cls = known[name]
     fields = {field.name: field for field in dataclasses.fields(cls)}
     given = found["fields"] if isinstance(found["fields"], dict) else {}
-    # fields that are newer than the file have defaults that preserve its meaning
+    # fields added since the file was written have defaults that preserve its meaning
     spare = {name for name, field in fields.items() if field.metadata.get("spare")}
     for wrong in sorted((set(given) ^ set(fields)) - spare):
         what = "lacks" if wrong in fields else "has an unknown field"

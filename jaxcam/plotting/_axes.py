@@ -1,4 +1,4 @@
-"""Provide axes to draw on, given or new, and common elements of axes."""
+"""Provide the axes of a figure, given or new, and elements that many figures share."""
 
 from typing import Any
 
@@ -44,7 +44,7 @@ def several_axes(axes, shape: tuple[int, int], **layout) -> tuple[Figure, np.nda
 
 
 def legend_above(ax: Axes) -> None:
-    """Draw a legend above the axes, clear of the curves; in two rows if necessary."""
+    """Draw a legend above the axes, clear of the curves, in two rows if necessary."""
     handles, labels = ax.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
     if unique:
@@ -61,8 +61,8 @@ def legend_above(ax: Axes) -> None:
 
 
 def clear_corner(ax: Axes) -> dict[str, Any]:
-    """Return the place of a legend above the axes: on the right if a power of ten is
-    written on the left.
+    """Return the position of a legend above the axes: on the right if the common power
+    of ten of the y-axis occupies the left.
     """
     axis = ax.yaxis
     formatter = axis.get_major_formatter()

@@ -25,7 +25,7 @@ _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
 # minimum number of cells of a picture along its shorter side
 _FINE = 500
-# size of the neighbourhood of a small cell, in computed cells
+# size of the neighbourhood of a small cell, in units of the computed cells
 _BLUR = 1.2
 _MARKS = "osD^vP*X"
 
@@ -138,8 +138,8 @@ def _finer(index, count: int) -> np.ndarray:
 
 
 def _colours(basins, orbits: bool):
-    """Return the colours of the attractors, followed by that for none, and the
-    legend.
+    """Return the colours, beginning with that of states without an attractor, and the
+    entries of the legend.
     """
     names = basins.names
     colours = [NOTHING, *COLOURS[: min(len(names), _SHOWN)]]
@@ -171,7 +171,7 @@ def _mark_of(basins, k: int) -> dict:
     """Return the marker of attractor `k`; it is white, which is visible on every
     colour.
     """
-    # a non-periodic attractor has many points
+    # a non-periodic attractor has many points, so its markers are small
     irregular = basins.labels[k, 1] == 0
     return {
         "marker": "o" if irregular else _MARKS[k % len(_MARKS)],

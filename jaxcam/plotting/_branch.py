@@ -30,12 +30,13 @@ _MARKS = {
     "detachment": ("v", "#56B4E9"),
 }
 _OTHER = ("X", SECTION)
-# labels next to the markers, for kinds with a long name
+# shorter labels next to the markers, for kinds with a long name
 _SHORT = {
     "Neimark-Sacker": "NS",
     "interruption of chatter": "interruption",
 }
-# a label closer than this to another one is omitted (points)
+# a label is omitted if it is closer than this to another one, horizontally and
+# vertically (points)
 _ROOM = 26, 11
 
 
@@ -198,6 +199,6 @@ def _name(ax: Axes, points, value, x_scale) -> None:
             fontsize="small",
             color=mark_of(point.kind)[1],
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
-            # below the markers, which its halo would cover
+            # the label is drawn below the markers, because its halo would cover them
             zorder=3,
         )

@@ -14,9 +14,10 @@ from ._style import BAND, FLIGHT, IMPACT, SECTION, styled
 
 # fraction of white in the last curve of a family
 _LIGHTEST = 0.5
-# parts of a curve shorter than this (periods) are not labelled
+# parts of a curve that are shorter than this (in periods) are not labelled
 _NAMED = 0.04
-# nor are curves this close to the axis (fraction of the height of the figure)
+# parts closer than this to the time axis (fraction of the height of the panel) are not
+# labelled either
 _LOWEST = 0.03
 
 

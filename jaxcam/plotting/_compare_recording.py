@@ -83,8 +83,8 @@ def compare_recording(
     above.plot(
         over[keep],
         samples[keep],
-        # the recording is wide and pale, so that it remains visible behind a simulation
-        # that coincides with it
+        # the line of the recording is wide and pale, so that it remains visible behind
+        # that of a simulation that coincides with it
         color=RECORDED,
         linewidth=4.5,
         label="recorded",

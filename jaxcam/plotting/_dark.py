@@ -18,7 +18,7 @@ _BACKGROUND = np.array([0x1E, 0x21, 0x29]) / 255
 _TEXT = np.array([0.92, 0.92, 0.94])
 # colours are lightened by this amount, because pure blue is hard to see on black
 _LIGHTER = 0.25
-# difference between the channels above which a colour is not grey
+# difference between the red, green and blue values above which a colour is not grey
 _COLOURFUL = 0.25
 # properties of an artist that contain a colour
 _PROPERTIES = {
@@ -97,7 +97,7 @@ def _recolour_values(artist: ScalarMappable) -> None:
 
 
 def _recolour_ticks(axes: Axes) -> None:
-    # also for ticks that are created later
+    # set the parameters of the axis, so that ticks created later have these colours too
     for axis in (axes.xaxis, axes.yaxis):
         parameters = axis.get_tick_params()
         found = {

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..sweeps import Chart, Diagram
 
 
-# colour and label of independent values, of upward sweeps and of downward sweeps
+# colour and label of independent runs, of upward sweeps and of downward sweeps
 _WAYS = {0: (SECTION, ""), 1: (FLIGHT, "upwards"), -1: (IMPACT, "downwards")}
 COLOURS = (
     "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
@@ -29,7 +29,7 @@ COLOURS = (
 _ROWS = 600
 # smallest and largest dots (points)
 _DOTS = 0.6, 2.4
-# for motions without an attractor
+# colour of motions without an attractor
 NOTHING = "#FFFFFF"
 
 

@@ -43,8 +43,8 @@ def local_map(
     ax = one_axes(ax)
     x_0, x_inf = float(local.x_0), float(local.x_inf)
     span = x_0 - x_inf
-    # equal steps, and equal steps in the cube root of the distance from x_0, where the
-    # slope is infinite
+    # use equal steps in x, and also equal steps in the cube root of the distance from
+    # x_0, because the slope is infinite at x_0
     x = np.unique(
         np.concatenate(
             [

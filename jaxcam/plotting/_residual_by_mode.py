@@ -195,8 +195,7 @@ def _draw_shares(
 
 
 def _name_records(figure: Figure, colours: dict[str, str]) -> None:
-    # the titles are above the axes, so the names of the recordings are above all of
-    # them
+    # titles are above each panel, so the names of the recordings are above all panels
     dots = [
         Line2D([], [], marker="o", linestyle="", color=colour, label=name)
         for name, colour in colours.items()
@@ -206,6 +205,6 @@ def _name_records(figure: Figure, colours: dict[str, str]) -> None:
 
 
 def _title(part: Residuals) -> str:
-    # the channel of an impact is the segmented channel; flights may have several
+    # contacts and impacts refer to the segmented channel; only flights may have several
     channel = name_and_unit(part.channel)[0]
     return f"{part.mode}, {channel}" if part.mode == "flight" else part.mode

@@ -19,9 +19,9 @@ SECTION = "#000000"
 RECORDED = "#ABABAB"
 BAND = "#BDBDBD"
 CAM = "#8A5F00"
-# a second item of the same kind: another method, another manifold
+# colour of a second item of the same kind, such as another method or manifold
 SECOND = "#009E73"
-# several constraints, in colours different from impact and contact
+# colours of several constraints, different from those of impacts and contacts
 _GAPS = (FLIGHT, "#009E73", "#CC79A7", "#56B4E9", SECTION)
 
 _P = ParamSpec("_P")

@@ -114,6 +114,6 @@ def _shade(ax: Axes, drawn: Curve) -> None:
 
 
 def _narrow(label: str) -> str:
-    # the height of a panel is less than the length of many labels
+    # many labels are longer than the height of a panel, so they are wrapped
     name, _, unit = label.rpartition(" (")
     return f"{textwrap.fill(name, 17)}\n({unit}"

@@ -91,8 +91,8 @@ def hits(trajectory: Trajectory, start: float, stop: float) -> Hits:
 def contact_spans(
     trajectory: Trajectory, start: float, stop: float
 ) -> Float[np.ndarray, "contacts 2"]:
-    """Return the start and end of every contact that overlaps the span, restricted to
-    it.
+    """Return the start and end of every contact that overlaps the span; the part of a
+    contact outside the span is cut off.
     """
     contacts = trajectory.contacts
     spans = np.stack([np.asarray(contacts.start), np.asarray(contacts.end)], axis=1)
@@ -152,15 +152,18 @@ def trajectory_curve(
 
 
 def _points(trajectory: Trajectory, knots, samples: int) -> list[int]:
-    """Return the number of points in each piece between two knots."""
+    """Return the number of points between each two consecutive knots, which are impacts
+    and ends of contacts.
+    """
     even = np.ceil(samples * np.diff(knots) / (knots[-1] - knots[0])) + 1
-    # a long run may oscillate between two samples; its steps follow every oscillation
+    # a long run may oscillate between two evenly spaced points, but its integration
+    # steps follow every oscillation
     steps = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
     follows = _POINTS_IN_STEP * np.diff(np.searchsorted(steps, knots))
     return np.maximum(np.maximum(even, follows), _SHORT_FLIGHT).astype(int).tolist()
 
 
 def _padded(times):
-    # a power of two, so that few programs are compiled for many figures
+    # pad to a power of two, so that few programs are compiled for many figures
     size = 1 << (len(times) - 1).bit_length()
     return np.pad(times, (0, size - len(times)), mode="edge")

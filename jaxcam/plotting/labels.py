@@ -17,7 +17,7 @@ def labelled(name: str, unit: str) -> str:
     """
     if not unit:
         return name
-    # a hyphen in parentheses is easily overlooked
+    # use a dash, because a hyphen in parentheses is easily overlooked
     return f"{name} ({'–' if unit == '-' else unit})"
 
 

@@ -11,8 +11,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 # Lengths of the cubics, relative to those of the parabolas that smooth the angle
 _LENGTHS = (20, 10, 5, 2.5)
-# The results for two lengths are compared by the mean square of their difference,
-# divided by the mean square that noise causes; below this ratio, the longer one is kept
+# Ratio of the mean square difference between the results for two lengths to that
+# expected from noise alone; below this ratio, the longer cubics are kept
 _SAME = 2.0
 
 
@@ -23,9 +23,11 @@ class DriveAcceleration:
     values: Float[np.ndarray, " k"]
     """Acceleration at each sample."""
     stderr: float
-    """Its standard error, due to the noise and to the smoothing."""
+    """Standard error of the acceleration, due to the noise and to the smoothing."""
     length: float
-    """Length (s) of the cubics; over shorter times, the error hardly changes."""
+    """Length (s) of the cubics; the error of `values` hardly changes over shorter
+    times.
+    """
 
 
 def drive_acceleration(
@@ -34,7 +36,7 @@ def drive_acceleration(
     """Estimate the acceleration by local cubics.
 
     Shorter cubics are chosen as long as their result differs from that of longer ones
-    by more than the noise.
+    by more than the noise explains.
 
     Args:
         angle: Samples of the angle of the drive (rad).
@@ -60,15 +62,16 @@ def drive_acceleration(
         apart = kernels[wide] - np.pad(kernels[narrow], pad)
         random = noise**2 * float(np.sum(apart**2))
         square = float(np.mean((values[wide] - values[narrow])[inside] ** 2))
-        # the error due to smoothing grows with the square of the length
+        # the error due to smoothing is proportional to the square of the length
         ratio = (counts[narrow] / counts[wide]) ** 2
         bias = max(0.0, square - random) / (1 - ratio) ** 2
         if square < _SAME * random:
             break
         chosen, bias = narrow, bias * ratio**2
-    # near the ends of a recording, the curvature is taken not in the middle of a cubic
-    # (u = 0) but closer to its end (u = 1); its variance is then 1 + 35 u^2 times, and
-    # its error due to the fourth derivative 1 - 7 u^2 times, the value in the middle
+    # near the ends of a recording, the second derivative of a cubic is evaluated not in
+    # its middle (u = 0) but closer to its end (u = 1); its variance is then 1 + 35 u^2
+    # times, and its error due to the fourth derivative 1 - 7 u^2 times, the value in
+    # the middle
     share = counts[chosen] / len(angle)
     own = (1 + 35 / 3 * share) * noise**2 * float(np.sum(kernels[chosen] ** 2))
     bias *= 1 + 77 / 15 * share

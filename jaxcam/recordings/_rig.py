@@ -12,7 +12,7 @@ from ..models import CamFollower, ConstantRestitution, EccentricCircle
 from ._errors import RigError
 
 
-# 19 of 20 velocities of the thesis cam-follower are below this (rad/s)
+# Speed (rad/s) that 19 of 20 velocities of the thesis cam-follower do not exceed
 _FAST = 2.0
 
 

@@ -14,7 +14,7 @@ from ._errors import RecordingError
 from ._recording import Recording
 
 
-# Filter steps per sample, because impacts fall between samples
+# Number of filter steps per sample; it is large because impacts occur between samples
 _FINER = 256
 
 

@@ -13,7 +13,8 @@ from ._lambda_map import hop_ratio, lambda_map, LAMBDA_MAX
 from ._scaling_law import scaling_law
 
 
-# maximum number of impacts; lambda - lambda_bar grows by 1/q at each (thesis, eq. 6.49)
+# maximum number of impacts; lambda - lambda_bar grows by the factor 1/q at each of them
+# (thesis, eq. 6.49)
 _IMPACTS = 4000
 
 
@@ -101,7 +102,7 @@ def _one(lam, r, bar):
 
     start = (lam, jnp.ones_like(lam), jnp.asarray(0))
     lam, scale, count = while_loop(goes_on, hop, start)
-    # between 1/3 and 3/8, one more impact follows after release
+    # for lambda between 1/3 and 3/8, one more impact follows after release
     after = (lam >= 1 / 3) & (lam <= LAMBDA_MAX)
     safe = jnp.where(after, lam, 0.35)
     end = jnp.where(after, lambda_map(safe, r), lam)

@@ -20,8 +20,8 @@ from ._beta_map import beta_parts
 from ._scalar import check_chatter_system
 
 
-# number of samples of the contact acceleration per period, to find where contact is
-# impossible
+# number of samples per period of the contact acceleration, from which a time without
+# contact is found
 _SAMPLES = 256
 
 
@@ -143,7 +143,7 @@ def frame_at(system, release, state) -> ChatterFrame:
     def suppressed(t, x):
         return normal_acceleration(system, t, x)[0]
 
-    # by jvp instead of grad, because the same program is differentiated again
+    # jvp and not grad, because the functions that use the jerk are differentiated again
     _, jerk = jax.jvp(
         suppressed,
         (release, state),

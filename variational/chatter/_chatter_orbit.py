@@ -78,6 +78,7 @@ class _Search(NamedTuple):
     # lambda and number (in its period) of the impact that defines the margin
     taken: Float[Array, ""]
     rank: Int[Array, ""]
+    # number of impacts in the current period so far
     here: Int[Array, ""]
 
 
@@ -145,7 +146,8 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
         return s.found & ~s.settled & before & (s.count < _IMPACTS)
 
     def hop(s):
-        # a flight that misses the constraint near release may return a period later
+        # a motion that just misses the constraint near release may hit it only in the
+        # next period
         point = next_impact(system, s.time, s.state, s.speed, 2 * period)
         since = point.time - frame.release
         passed = jnp.floor(jax.lax.stop_gradient(since) / period).astype(s.turn.dtype)
@@ -156,7 +158,7 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
         small = point.speed * frame.jerk <= _SMALL * (1 - restitution) * push * push
         new = turn > s.turn
         rank, here = jnp.where(new, -1, s.rank), jnp.where(new, 0, s.here)
-        # the last impact before release that is not far below lambda_bar
+        # take the last impact before release whose lambda is not far below lambda_bar
         take = point.found & early & (turn == periods) & ((lam >= half) | (rank < 0))
         return _Search(
             time=point.time,
@@ -199,8 +201,8 @@ def orbit_from(system, frame: ChatterFrame, periods: int = 1) -> ChatterOrbit:
     margin = koenigs(s.taken, law.lambda_bar, restitution, law.q) * jnp.exp(
         s.rank.astype(jnp.float64) * jnp.log(law.q)
     )
-    # an impact after release belongs to the sequence if it occurs as early as the
-    # lambda-map predicts: within half of the time to release at the previous impact
+    # an impact soon after release still belongs to the sequence: by the lambda-map, it
+    # follows release within half of the time from the previous impact to release
     local = s.found & (s.tau < jnp.abs(s.tau_before))
     listed = jnp.where(complete | local, s.count, s.count - 1)
     return ChatterOrbit(

@@ -4,9 +4,9 @@ theory.
 At the interruption, the map over a period consists of Theta, a smooth map from a
 section after release to an impact D* of the chatter sequence (at time tau* relative to
 release), followed by beta. After beta, all motions lie along one direction B, so one
-number determines them: epsilon = tau*^2 beta, which at release is a relative velocity c
-epsilon. With A the derivative of Theta, C that of lambda, and mu the distance of the
-parameter from the interruption,
+number determines them: epsilon = tau*^2 beta, which corresponds to the relative
+velocity c epsilon at release. With A the derivative of Theta, C that of lambda, and mu
+the distance of the parameter from the interruption,
 
     epsilon' = tau*^2 beta(lambda_bar + C A B epsilon + lambda_mu mu),
 
@@ -144,11 +144,11 @@ class ComposedMap(eqx.Module):
         return self._section(self._left(self.incidence * parameter), parameter)
 
     def _left(self, deviation):
-        """Return epsilon for a deviation that grew over all the impacts before D*.
+        """Return epsilon for the deviation of lambda at D* that linear theory predicts.
 
-        The growth is linear only in the coordinate K, so beta is evaluated n impacts
-        earlier, where the deviation is small, K is lambda - lambda_bar, and tau is
-        larger by p^-n.
+        The growth from impact to impact is linear only in the coordinate K, so beta is
+        evaluated n impacts earlier, where the deviation is small, K is lambda -
+        lambda_bar, and tau is larger by p^-n.
         """
         law = scaling_law(self.frame.restitution)
         deviation = jnp.asarray(deviation, jnp.float64)
@@ -209,7 +209,8 @@ def _compose(along, value, rank, phase) -> ComposedMap:
         frame = prepared_frame(moved, jnp.asarray(phase * period, jnp.float64))
         zero = jnp.zeros(())
         point = impact_after(moved, frame.release, frame.state, zero, 0.0, rank)
-        # the orbit starts at the release of the frame, a period later than D*
+        # this impact follows the release of the frame; D* is the same one a period
+        # earlier
         return moved, frame, point.time - period, point.speed
 
     def section_of(moved, frame, velocity):

@@ -98,7 +98,8 @@ def find_lobes(
         )
     along = along / along[component]
     scan = base + np.asarray(deviations, dtype=float)
-    # rows of the scan, the brackets, the points of the lobes, and three single rows
+    # number of rows for the scan, the brackets, the points of the lobes, and three
+    # calls with one row each
     total = _rows(len(scan)) + (most + 2) * _PASSES + _rows(most * samples) + 3
     turn = _Rows(
         lambda row: _turns(system, state, along, row, phase, component), total, progress
@@ -109,7 +110,7 @@ def find_lobes(
             "The deviations stay on one side of the interruption: chatter is complete "
             "for all of them or for none. Use a wider range with both signs."
         )
-    # the bracket leads outwards from the last motion that sticks
+    # the accumulation lies between the last motion that sticks and its neighbour
     edge = np.flatnonzero(np.diff(stuck.astype(int)))[0]
     inner, outer = (edge, edge + 1) if stuck[edge] else (edge + 1, edge)
     bottom, top = _bisect(turn, float(scan[inner]), float(scan[outer]), lambda n, s: s)
@@ -118,7 +119,7 @@ def find_lobes(
 
     farthest = scan[-1] if stuck[edge] else scan[0]
     corners = _corners(turn, accumulation, farthest, most)
-    # dense at the outer corner, where the slope is infinite
+    # points are dense at the outer corner, where the slope is infinite
     share = np.linspace(0.0, 1.0, samples) ** 2
     points = corners[:-1, None] + share * np.diff(corners)[:, None]
     images, slopes, _, _ = turn(points.ravel())

@@ -1,10 +1,10 @@
 """Integrate free flight together with its normal velocity and gap.
 
-Gap and normal velocity are integrated together with the state: z' = v, v' = a, starting
-at the surface with the rebound speed, where a is the normal acceleration in free
-flight. They retain their relative accuracy when the gap computed from the state has
-lost it, so impacts after flights of height 1e-12 are as accurate as those after high
-flights.
+The gap z and the normal velocity v obey z' = v and v' = a, where a is the normal
+acceleration in free flight; a flight starts at the surface with the rebound speed.
+Integrated with the state, they retain their relative accuracy when the gap computed
+from the state has lost it, so impacts after flights of height 1e-12 are as accurate as
+those after high flights.
 """
 
 import jax.numpy as jnp
@@ -20,13 +20,13 @@ TOLERANCE = 1e-14
 
 
 def runge_kutta_step(rates, s, y, h):
-    """Take one step of length `h`; return the state after it and the error estimate."""
+    """Return the state after one step of length `h`, and the error estimate."""
     return array_step(DOPRI8, rates, s, y, h)[:2]
 
 
 def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
-    """Return the rates of state, normal velocity and gap, `y` of shape `(n + 2,)`,
-    along free flight, as a function of the time after `time`.
+    """Return the function `rates(s, y)` of free flight. Here, s is the time since
+    `time`, and y, shape `(n + 2,)`, contains state, normal velocity and gap.
     """
 
     def rates(s, y):
@@ -38,7 +38,7 @@ def flight_rates(system: HybridSystem, time: ArrayLike = 0.0):
 
 
 def on_flight(state, speed, height: ArrayLike = 0.0):
-    """Return the integrated quantities: state, normal velocity and gap."""
+    """Return the integrated quantities (state, normal velocity, gap) in one vector."""
     beside = jnp.stack([jnp.asarray(b, jnp.float64) for b in (speed, height)])
     return jnp.concatenate([state, beside])
 

@@ -82,7 +82,7 @@ def grazing_manifold(
 def _manifold(system, n, points, horizon) -> GrazingManifold:
     grid = system.period * jnp.linspace(0.0, 1.0, 4 * points, endpoint=False)
     push = contact_acceleration(system, grid, jnp.zeros(2))
-    # times without contact, sampled evenly wherever they are in the period
+    # choose `points` times without contact, evenly spread over all such times
     order = jnp.argsort(push <= 0, stable=True)
     count = jnp.sum(push > 0)
     picks = order[(jnp.arange(points) * count) // points]
@@ -156,7 +156,7 @@ def chattering_region(
 def _boundary(system, points, impacts, near) -> ImpactCurve:
     frame = prepared_frame(system, 0.0)
     law = scaling_law(frame.restitution)
-    # a fundamental segment: its first point is the image of its last
+    # a segment of the parabola; its first point is the next impact after its far end
     share = jnp.arange(points) / points
     tau = -near * system.period * law.p ** (1 - share)
     speed = law.lambda_bar * frame.jerk * tau * tau

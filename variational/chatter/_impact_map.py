@@ -105,7 +105,7 @@ def rebound_speed(system: HybridSystem, time, before, approach):
     it.
 
     For slow impacts, the difference of two nearly equal velocities would be inaccurate,
-    so the law is integrated from the impact of zero speed.
+    so the derivative of the impact law is integrated from zero speed.
     """
     direction = normal_directions(system, time, before)[0]
     rest = before - approach * direction
@@ -166,8 +166,10 @@ def impact_jacobian(system: HybridSystem, time, speed) -> Float[Array, "2 2"]:
     """Return the derivative of the impact map P_I with respect to time and rebound
     speed.
 
-    Its determinant is r^2 v0/v1 times the change of phase volume in flight; the
-    derivative is unbounded if the next impact grazes, v1 = 0 (thesis, eqs. 6.11-6.12).
+    With the coefficient of restitution r and the rebound speeds v0 and v1 of the two
+    impacts, its determinant is r^2 v0/v1 times the change of phase volume in flight;
+    the derivative is unbounded if the next impact grazes, v1 = 0 (thesis, eqs.
+    6.11-6.12).
 
     Args:
         system: The system.

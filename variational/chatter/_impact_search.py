@@ -19,13 +19,14 @@ from jaxcam.hybrid.surface import normal_acceleration
 from ._free_flight import flight_rates, on_flight, runge_kutta_step, TOLERANCE
 
 
-# forcing period / longest step: a step must not contain two minima of the gap
+# number of longest steps per forcing period, such that no step contains two minima of
+# the gap
 _STEPS_PER_PERIOD = 16
 # if the landing time changes by less than this, relative to the flight time and to the
 # time in which the acceleration would stop the approach, the next step is the last one
 _LAST_CHANGE = 1e-3
-# maximum numbers of steps towards a landing and towards a lowest point; the last step
-# is then used
+# maximum numbers of steps towards a landing and towards a lowest point, after which the
+# last step is accepted
 _LANDINGS, _LOWERINGS = 100, 12
 
 # length of the first step in units of speed / acceleration, slightly more than the 2 at
@@ -34,7 +35,7 @@ _BEHIND = 2.2
 
 _SEARCH, _LAND, _LAST, _BOTTOM = range(4)
 frozen = jax.lax.stop_gradient
-"""Remove the derivative, because step lengths and decisions carry none."""
+"""Return a value without its derivative, for step lengths and decisions."""
 
 
 class SearchState(NamedTuple):
@@ -52,6 +53,7 @@ class SearchState(NamedTuple):
     longest: Float[Array, ""]
     """Longest step."""
     mode: Int[Array, ""]
+    """Purpose of the next step: `_SEARCH`, `_LAND`, `_LAST` or `_BOTTOM`."""
     low: Float[Array, ""]
     """Length of a step that ends before the point that is searched for."""
     high: Float[Array, ""]
@@ -63,7 +65,7 @@ class SearchState(NamedTuple):
 
     @property
     def searches(self) -> Bool[Array, ""]:
-        """Return whether no impact has been found yet."""
+        """Return whether the next step is not aimed at an impact or a lowest point."""
         return self.mode == _SEARCH
 
     @property
@@ -75,13 +77,13 @@ class SearchState(NamedTuple):
 def take_off(
     system: HybridSystem, time, state, speed, longest, height: ArrayLike = 0.0
 ) -> SearchState:
-    """Start a flight from an impact, from release, or at a `height`.
+    """Return the start of a flight from an impact, from release, or from a `height`.
 
     `longest` is the longest step.
     """
     longest, time = frozen(longest), jnp.asarray(time, jnp.float64)
     pull = -frozen(normal_acceleration(system, time, state)[0])
-    # a parabola returns after 2 u / pull
+    # a parabola returns after 2 speed / pull
     parabola = _BEHIND * frozen(speed) / jnp.where(pull > 0, pull, 1.0)
     short = (pull > 0) & (frozen(speed) > 0)
     return SearchState(
@@ -111,13 +113,15 @@ def longest_step(system: HybridSystem, horizon=jnp.inf) -> Float[Array, ""]:
 def search_step(
     system: HybridSystem, f: SearchState
 ) -> tuple[SearchState, Bool[Array, ""]]:
-    """Take one step; also return whether it ends at an impact, before the rebound."""
+    """Return the state of the search after one step, and whether the step ends at an
+    impact; the motion is then that before the rebound.
+    """
 
     rates = flight_rates(system)
     end, wrong = runge_kutta_step(rates, f.time, f.y, f.length)
     rate = rates(f.time + f.length, end)
-    # zero at a landing, but its derivative is not, because the landing moves with the
-    # motion
+    # `late` is zero at a landing, but its derivative is not, because the time of the
+    # landing depends on the motion
     late = end[-1] / jnp.where(frozen(end[-2]) < 0, end[-2], -jnp.inf)
     lands = f.lands
     there = end - late * rate
@@ -144,7 +148,7 @@ def _next(f: SearchState, end, wrong, rate) -> tuple[SearchState, Bool[Array, ""
     searches, bottoms = f.mode == _SEARCH, f.mode == _BOTTOM
     good = ~searches | (size <= 1)
 
-    # to land, aim at the time at which a parabola through the end of the step lands
+    # to land, aim at the time at which a parabola from the end of this step lands
     enters = good & (gap < 0) & (searches | bottoms)
     landing = enters | (f.mode == _LAND)
     falls = (rise < 0) & (rise * rise > 2 * pull * gap)

@@ -2,9 +2,9 @@
 
 The orbit that sticks once per period starts each period at release with zero relative
 velocity, so its interruption is given by one scalar equation, accumulation = release +
-period. This equation is not smooth (the difference falls like a power between 1/2 and
-1), so its smooth form `ChatterOrbit.margin` is solved, by Newton's method within a
-bracket.
+period. This equation is not smooth (the difference of its sides falls like a power
+between 1/2 and 1), so its smooth form `ChatterOrbit.margin` is solved, by Newton's
+method within a bracket.
 """
 
 import equinox as eqx
@@ -26,10 +26,10 @@ _ITERATIONS = 200
 
 
 class Line(eqx.Module):
-    """A one-parameter family of systems, stored as all other data and the index of the
-    parameter.
+    """A one-parameter family of systems, `base` + value x `direction`.
 
-    It is a pytree, so one compiled program is used for every choice of parameter.
+    In `base`, the parameter is zero; in `direction`, it is one, and all other data are
+    zero. The family is a pytree, so one compiled program serves all parameters.
     """
 
     base: HybridSystem
@@ -67,7 +67,7 @@ class Interruption(eqx.Module):
     slope: Float[Array, ""]
     """Derivative of the margin with respect to the parameter at `value`."""
     turns: Int[Array, ""]
-    """Number of evaluations of one period."""
+    """Number of evaluations of the margin."""
 
 
 def interruption_in(
@@ -95,7 +95,7 @@ def interruption_in(
 
 
 def _margin(along: Line, value, periods: int):
-    """Return the margin; a period without impact or chatter counts as interrupted."""
+    """Return the margin; a motion without a margin (NaN) counts as interrupted."""
     orbit = prepared_orbit(along.at(value).prepared(), 0.0, periods)
     return jnp.where(jnp.isnan(orbit.margin), jnp.inf, orbit.margin)
 
@@ -136,7 +136,7 @@ def _no_tangent(leaf):
 
 @program
 def _rate(along: Line, moved: Line, value, periods: int):
-    """Return the change of the margin at a fixed value of the parameter."""
+    """Return the change of the margin due to `moved`, at a fixed parameter value."""
     return eqx.filter_jvp(lambda a: _margin(a, value, periods), (along,), (moved,))[1]
 
 

@@ -30,7 +30,7 @@ _NEAR = 1e-12
 
 
 class _Sequence(NamedTuple):
-    """The state of the sequence after the impacts so far."""
+    """The state of the sequence of impacts after those found so far."""
 
     over: Bool[Array, ""]
     turn: Int[Array, ""]
@@ -62,7 +62,7 @@ def interruption_margin(
 
     Returns:
         The margin; NaN if there is no impact in the last period, or if contact occurs
-            earlier.
+            in an earlier period.
 
     Raises:
         ValueError: The function is differentiated twice.
@@ -72,8 +72,8 @@ def interruption_margin(
 
 @jax.custom_jvp
 def _last(slope):
-    """Return the slope, which must not be differentiated again: impacts are correct
-    only to first order.
+    """Return the slope, which must not be differentiated again, because the derivatives
+    of impacts are correct only to first order.
     """
     return slope
 
@@ -110,7 +110,8 @@ def _margin(system, frame: ChatterFrame, *, periods: int) -> Float[Array, ""]:
 
     def goes_on(carry):
         flight, said, count = carry
-        # a flight that misses the constraint near release may return a period later
+        # a motion that just misses the constraint near release may hit it only in the
+        # next period
         waits = flight.time - flight.since < 2 * period
         return ~said.over & waits & (count < _MAX_STEPS)
 
@@ -143,9 +144,9 @@ def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequen
     settled = early & (push < 0) & (speed * frame.jerk <= small)
     new, last = turn > s.turn, turn == periods
     rank, here = jnp.where(new, -1, s.rank), jnp.where(new, 0, s.here)
-    # the last impact before release that is not far below lambda_bar
+    # take the last impact before release whose lambda is not far below lambda_bar
     takes = early & last & ((lam >= law.lambda_bar / 2) | (rank < 0))
-    # later impacts only change terms of order q^k tau_k
+    # later impacts change the margin only by terms of order q^k tau_k
     rest = jnp.exp(here.astype(jnp.float64) * jnp.log(law.q)) * jnp.abs(tau)
     return _Sequence(
         over=settled | (last & (~early | (rest <= _ENOUGH * period))),
@@ -158,7 +159,7 @@ def _heard(system, frame, periods: int, s: _Sequence, f: SearchState) -> _Sequen
 
 
 def _bounced(system: HybridSystem, f: SearchState) -> SearchState:
-    """Apply the impact law to the motion just before an impact."""
+    """Return the start of the flight after an impact, given the motion before it."""
     x, approach = f.y[:-2], f.y[-2]
     after = one_constraint(system.impact(f.time, x), 1)
     speed = rebound_speed(system, f.time, x, approach)

@@ -2,8 +2,8 @@
 
 Close to the release point of sticking, the relative acceleration is c tau, with tau the
 time relative to release and c the jerk at release. An impact at tau < 0 with rebound
-speed v has lambda = v / (c tau^2); the next one is at h(lambda) tau and has f(lambda)
-(thesis, eqs. 6.28-6.37).
+speed v has lambda = v / (c tau^2); the next impact is at the time h(lambda) tau and has
+the coordinate f(lambda) (thesis, eqs. 6.28-6.37).
 """
 
 import jax.numpy as jnp

@@ -63,7 +63,7 @@ class LocalMap(eqx.Module):
         is not valid.
         """
         width = 1 - jnp.exp(self.M)
-        # the sum of beta_k up to k = j - 1 is solved for j
+        # the number j of complete lobes between x_0 and x, from the sum of their widths
         share = (self.x_0 - x) / self.delta_x * width
         lobes = share < 1
         depth = jnp.log(jnp.where(lobes, 1 - share, 1.0)) / self.M

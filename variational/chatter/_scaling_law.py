@@ -33,7 +33,8 @@ def scaling_law(r) -> ScalingLaw:
     With s = sqrt(1 - 8 lambda / 3), the fixed point of the map in the thesis, eq. 6.36,
     is a root of 9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1). The other positive root
     has p < 0: it corresponds to an impact after release, so it is not a fixed point of
-    an actual motion. Then p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
+    an actual motion. With the first root,
+    p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
 
     Args:
         r: Coefficient of restitution of slow impacts, any shape.
@@ -64,8 +65,8 @@ def scaling_law(r) -> ScalingLaw:
         slope = (27 * s + 6) * s - (5 + 8 * r)
         return s - value / slope
 
-    # the cubic is convex here, so Newton's method from s = 1 converges to the largest
-    # root
+    # the cubic is convex for s > 0, so Newton's method from s = 1 converges to the
+    # largest root
     s = jax.lax.fori_loop(0, 64, newton, jnp.ones_like(r))
     p = (3 * s - 1) / 2
     q = 4 * s * s * p / ((1 + s) * (1 + s))

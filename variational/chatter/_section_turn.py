@@ -39,7 +39,7 @@ class SectionArrival(eqx.Module):
     become negligible.
     """
     stuck: Bool[Array, "..."]
-    """Whether the motion stuck."""
+    """Whether the motion stuck before the section."""
 
 
 class _Run(NamedTuple):
@@ -153,7 +153,7 @@ def _turn(system, state, phase) -> SectionArrival:
 
 
 def flight_start(system, time, state):
-    """Return a state off the surface as the start of a flight, with its gap."""
+    """Return the start of a flight at a state off the surface, and the gap there."""
     state = jnp.asarray(state, jnp.float64)
     speed = normal_velocity(system, time, state)[0]
     yes = jnp.asarray(True)

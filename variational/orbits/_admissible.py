@@ -13,7 +13,7 @@ from ._shooting import Shooting
 
 
 # error of a zero gap or speed due to rounding and the tolerance of the equations,
-# relative to the size of gaps: a lower gap is a penetration
+# relative to the size of gaps; a gap below minus this value is a penetration
 _ROUNDING = 1e-9
 # largest error of the flights for which the gaps are reliable
 _ERROR = 1e-9
@@ -32,7 +32,8 @@ def inadmissible(
 
     **Arguments:** lowest gap of each flight and approach speed of each impact, by
     index, the error of the flights and the size of the gaps, as in
-    [`variational.orbits.Seen`][]; period (s); Runge-Kutta steps in a flight.
+    [`variational.orbits.Seen`][]; period (s); number of Runge-Kutta
+    steps in a flight.
     """
     room = _ROUNDING * float(gap_size)
     for k, value in gaps.items():

@@ -31,7 +31,7 @@ def start_at_impact(system: HybridSystem, t, state, period) -> ImpactStart | Non
     """Return the impact at `state`, or None if no constraint is touched with a nonzero
     speed.
     """
-    # as arrays, because numbers would be compiled into the program
+    # pass arrays, because numbers would be compiled into the program
     t, period = (jnp.asarray(x, dtype=jnp.float64) for x in (t, period))
     gap, speed, fall, after, size = map(np.asarray, _look(system, t, state, period))
     closed = np.abs(gap) <= _ZERO * size

@@ -1,8 +1,9 @@
 """Refine the impacts of a periodic orbit to the accuracy of its parameters.
 
 A run that locates its impacts loses digits at slow impacts: an error d of the position
-changes an impact speed v by about a d / v. As a solution of the shooting equations, the
-impacts are as well conditioned as the orbit itself, regardless of their speed.
+changes an impact speed v by about a d / v, where a is the acceleration. As a solution
+of the shooting equations, the impacts are as well conditioned as the orbit itself,
+regardless of their speed.
 """
 
 from typing import NamedTuple
@@ -43,7 +44,8 @@ def close(
     period,
     scale: Float[ArrayLike, " n1"],
 ) -> Knots:
-    """Refine the impacts of an orbit without contact; they are unchanged if that fails.
+    """Return the refined impacts of an orbit without contact, or the impacts unchanged
+    if the refinement fails.
 
     `scale` is the size to which gaps and state components are relative. The states
     before impacts are those at the ends of the flights.
@@ -58,7 +60,7 @@ def close(
     fill = np.minimum(np.arange(length), number - 1)
     real = np.arange(length) < number
     following = np.where(real, (np.arange(length) + 1) % number, np.arange(length))
-    # as an array, because a number would be compiled into the program
+    # pass an array, because a number would be compiled into the program
     span = np.asarray(period, dtype=float)
     made = _newton(system, rows[fill], sides[fill], real, following, span, scale)
     improved, arrived, misses = map(np.asarray, made)

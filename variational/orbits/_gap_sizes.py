@@ -15,15 +15,15 @@ def gap_sizes(
     state: Float[ArrayLike, " n"],
     period: Float[ArrayLike, ""],
 ) -> Float[Array, " m"]:
-    """Return the scale of each gap, in its units.
+    """Return the scale of each gap, in the unit of that gap.
 
-    It is the largest change of the gap when each state component changes by its size
-    ([`jaxcam.hybrid.sizes.component_sizes`][]).
+    The scale is the largest change of the gap when each state component changes by its
+    size ([`jaxcam.hybrid.sizes.component_sizes`][]).
 
     **Arguments:** time (s), state `(n,)`, and the period of the motion (s).
 
     Returns:
-        Shape `(m,)`, for each constraint.
+        Scales, one for each constraint, shape `(m,)`.
     """
     sizes = component_sizes(system, t, state, period)
     slopes = jax.jacfwd(lambda x: gaps(system, t, x))(jnp.asarray(state))

@@ -1,7 +1,8 @@
 """Periodic orbits represented by their impacts, as smooth functions of all parameters.
 
-The number of impacts is given, so no events have to be detected; this is needed for
-fits to published numbers.
+The number of impacts is given, so no events have to be detected. Fits to published
+numbers use these orbits, because such fits need derivatives with respect to all
+parameters.
 """
 
 import equinox as eqx
@@ -25,7 +26,7 @@ class ImpactOrbit(eqx.Module):
     states: Float[Array, "k n"]
     """State just after each impact, shape `(k, n)`."""
     constraints: tuple[int, ...] | None = eqx.field(static=True, default=None)
-    """Constraint hit at each impact; default: the first."""
+    """Constraint hit at each impact; default: the first constraint at every impact."""
     periods: int = eqx.field(static=True, default=1)
     """Number of forcing periods after which the orbit repeats."""
     steps: int = eqx.field(static=True, default=32)
@@ -55,7 +56,7 @@ class ImpactOrbit(eqx.Module):
         return jnp.concatenate([phases[:, None], self.states], axis=1).ravel()
 
     def moved(self, unknowns: Float[Array, " u"], system: HybridSystem):
-        """Return an orbit of the same kind with other unknowns.
+        """Return an orbit with the same sequence of impacts but other unknowns.
 
         Args:
             unknowns: Unknowns of the equations, shape `(u,)`.

@@ -33,8 +33,8 @@ def implicit_root(
     """
 
     def newton(function, start):
-        # a single call site, because tracing and compiling the residual takes most of
-        # the time
+        # call the function at one place only, because tracing and compiling it takes
+        # most of the time
         def twice(x):
             value = function(x)
             return value, value

@@ -60,8 +60,9 @@ class Link(NamedTuple):
 def landed(
     system: HybridSystem, start, time, which, before, by_state: Float[Array, "n n"]
 ) -> Link:
-    """Return the link of a flight from a row (time, state), given its end and the
-    derivative with respect to the state.
+    """Return the link of a flight from a row (time, state), given the state `before`
+    the impact at its end and the derivative `by_state` of that state with respect to
+    the initial state.
     """
 
     def arrive(t, x):
@@ -98,9 +99,9 @@ def matrix_of(links: Link, following, sign: Any = 1.0, real: Any = True):
     """Return the derivative of all equations (gap, next state - state after impact)
     with respect to all rows.
 
-    **Arguments:** links `(m, ...)`; the index of the row after each; factors of the
-    entries for that row; which rows are valid, the others being replaced by the
-    identity.
+    **Arguments:** `links` of shape `(m, ...)`; `following`, the index of the next row
+    for each row; `sign`, factors of the entries for the next row; `real`, which marks
+    the valid rows (the others are replaced by those of the identity).
 
     Returns:
         Shape `(m (1 + n), m (1 + n))`, times in s.
@@ -136,8 +137,9 @@ def product_of_links(
 ) -> tuple[Float[Array, "n n"], Float[Array, "n n"]]:
     """Return the monodromy matrix for the state just after the first impact.
 
-    With `number`, it is returned as two matrices, regular + singular / approach speed
-    of that impact, which are both bounded if the impact is grazing.
+    With the `number` of an impact, the result is two matrices, which are bounded even
+    if that impact is grazing: the monodromy matrix is the first plus the second divided
+    by the normal velocity on arrival. Without `number`, the second matrix is zero.
     """
     n = links.field.shape[1]
 
@@ -174,8 +176,9 @@ def antiperiodic(
     """Return the derivative of the equations for a deviation that changes sign each
     period.
 
-    It is singular at a flip, where its null vector is the deviation of the doubled
-    orbit. The first column belongs to the first phase, even without forcing.
+    It is singular at a flip, where its null vector is the deviation of the
+    period-doubled orbit. The first column belongs to the first phase, even without
+    forcing.
     """
     if not shooting.rows:
         return jax.jacfwd(shooting.residual)(u, system) + 2 * jnp.eye(u.size)
@@ -240,8 +243,8 @@ def equations_and_monodromy(
 
 
 def _column_scale(shooting: AbstractShooting, u, system) -> Float[Array, "1 u"]:
-    """Return the factors from derivatives with respect to times (s) to those with
-    respect to phases.
+    """Return the factors that convert derivatives with respect to times (s) to
+    derivatives with respect to phases.
     """
     unit = shooting.period(u, system) / shooting.turns
     row = jnp.ones(1 + shooting.dimension).at[0].set(unit)
@@ -252,7 +255,7 @@ def return_map(shooting: AbstractShooting, u, system: HybridSystem, matrix):
     """Return the derivative of the return map to the first constraint, from the
     monodromy matrix.
 
-    It refers to coordinates on the surface, and has the shape `(n - 1, n - 1)`.
+    The result refers to coordinates on the surface, and has the shape `(n - 1, n - 1)`.
     """
     starts, _ = shooting.segments(u, system)
     t, x = starts[0, 0], starts[0, 1:]
@@ -266,10 +269,11 @@ def return_map(shooting: AbstractShooting, u, system: HybridSystem, matrix):
 
 
 def around_the_period(shooting: AbstractShooting, u, system: HybridSystem):
-    """Return the Jacobian of the map from the first impact to that a period later.
+    """Return the Jacobian of the map from the first impact to the impact one period
+    later.
 
-    Its variables are (phase, state); without forcing, only the state; without impacts,
-    the state at time zero.
+    The map acts on the phase and the state of the impact; without forcing, only on the
+    state; without impacts, on the state at time zero.
 
     Returns:
         The Jacobian as a function of a point, and the point on the orbit.

@@ -16,7 +16,7 @@ _HALVINGS = 20
 
 
 def nodes_of(system: HybridSystem, start, end, steps: int):
-    """Return times and states at both ends of all steps of a flight, and its error."""
+    """Return times and states at the ends of all steps of a flight, and its error."""
     later, states, wrong = flight_nodes(system, start[0], start[1:], end, steps)
     times = jnp.concatenate([start[:1], later])
     return times, jnp.concatenate([start[None, 1:], states]), wrong
@@ -61,7 +61,7 @@ def lowest_times(
         node_t, node_x = times[k], states[k]
 
         def newton(_, found):
-            # the gap belongs to the time before its last change, which is only rounding
+            # the gap is that before the last change of s, which is only rounding
             s, _ = found
             x = flight_nodes(system, node_t, node_x, node_t + s, 1)[1][-1]
             v = normal_velocity(system, node_t + s, x)[which]
@@ -89,8 +89,9 @@ def gap_or_speed(
     steps: int,
     count,
 ) -> Float[Array, ""]:
-    """Return the lowest gap of flight `number`, or for `number` >= `count` the approach
-    speed of an impact; `count` is the number of flights without padding.
+    """Return the lowest gap of flight `number`, or, for `number` >= `count`, the
+    approach speed of impact `number` - `count`, where `count` is the number of flights
+    without padding.
 
     One integration is used for both, so one small program is sufficient. The result is
     differentiable: the time of a minimum has no first-order effect, so the derivative
@@ -115,14 +116,16 @@ def gap_or_speed(
 
 
 def _rise(speeds, changes):
-    """Return where a velocity rises through zero in each step, from a cubic.
+    """Return where a velocity rises through zero in each step, from the cubic that
+    matches the velocity and its rate at both ends.
 
     A fall and a rise within the same step are included, because a low flight may be
     shorter than a step.
 
     Returns:
-        The fraction of the step, the relative distance covered up to that point, and
-            whether there is such a rise; `(steps, m)` each.
+        The fraction of the step at which the rise occurs, the distance covered up to
+            that point divided by the duration of the step, and whether there is such a
+            rise; `(steps, m)` each.
     """
     a, b = speeds[:-1], speeds[1:]
     p, q = changes[:-1], changes[1:]

@@ -72,7 +72,7 @@ class Orbit(Printed):
     """The events at switching surfaces in one period; None without surfaces."""
 
     def _table(self) -> ShortTable:
-        """Tabulate the impacts of one period, with a sentence on stability."""
+        """Return a table of the impacts of one period, with a sentence on stability."""
         sizes = ", ".join(f"{abs(m):.3g}" for m in self.multipliers)
         sentence = (
             f"{'stable' if self.stable else 'unstable'} orbit of period "
@@ -229,7 +229,7 @@ def _knots(system, impacts: Impacts, start: ImpactStart | None, t0, period, scal
     time, after = np.asarray(impacts.time), np.asarray(impacts.after)
     sides = np.asarray(impacts.constraint)
     if start is not None:
-        # the impact at the start, which may also occur at the end of the run
+        # begin with the impact at the start, and omit it at the end of the run
         other = (time > t0) & (time < t0 + period - start.window)
         time = np.append(t0, time[other])
         after = np.concatenate([start.after[None], after[other]])

@@ -27,8 +27,8 @@ class TurnPieces(eqx.Module):
     before: Float[np.ndarray, "k n"]
     """State before the event, (k, n)."""
     contact: Bool[np.ndarray, "k m"]
-    """Constraints in contact during the piece, (k, m), where m includes the constraints
-    that are hit or touched.
+    """Constraints in contact during the piece, (k, m), where m is just large enough to
+    include every constraint that is hit or touched.
     """
     contact_after: Bool[np.ndarray, "k m"]
     """Constraints in contact during the next piece, (k, m)."""

@@ -45,8 +45,8 @@ def product_of(
     pieces: TurnPieces,
     sticks: bool,
 ) -> Product:
-    """Multiply the transition matrices of the flights and the saltation matrices
-    between them.
+    """Return the product of the transition matrices of the flights and the saltation
+    matrices between them.
 
     **Arguments:** `build(parameters)`, which returns the system; the `parameters`; the
     `state` at the start of the first piece; the `pieces`; and `sticks`, whether any
@@ -102,7 +102,7 @@ def with_all_constraints(system, pieces: TurnPieces, state) -> TurnPieces:
 
 
 def _compose(outer, inner, n):
-    """Apply the chain rule to matrices of derivatives [state | parameters]."""
+    """Apply the chain rule to two derivatives with the columns [state | parameters]."""
     return (outer[:, :n] @ inner).at[:, n:].add(outer[:, n:])
 
 
@@ -158,8 +158,8 @@ def _across(build, parameters, piece: TurnPieces, law_of, sticks):
     law_p = jax.jacfwd(lambda p: law(p)(t, x))(parameters)
     by_parameter = law_p + jnp.outer(share, jax.jacfwd(height)(parameters))
     landed = law(parameters)(t, x)
-    # the law preserves the gap, so its component normal to the surface is the change of
-    # speed
+    # the law preserves the gap, so the determinant of the saltation matrix is that of
+    # the law times the ratio of the normal velocities after and before the impact
     rate, slope = jax.grad(gap_of(system, side), argnums=(0, 1))(t, landed)
     speed_after = rate + slope @ after(t, landed)
     change = jnp.linalg.det(law_x) * speed_after / jnp.where(hit, speed, 1.0)

@@ -89,7 +89,7 @@ def seed(
             "an orbit without forcing must have an impact to be continued as "
             "ImpactingOrbits; follow it as a LimitCycle"
         )
-    # the state at a whole number of periods
+    # start from the state at a whole number of periods
     whole = -np.floor(-(t0 / length - 1e-12)) * length
     if isinstance(motion, Trajectory):
         state = np.asarray(motion.at([min(max(whole, t0), t0 + length)])[0])

@@ -7,9 +7,10 @@ that is hit,
     H(t_{k+1}, phi(t_{k+1}; t_k, x_k)) = 0,
     x_{k+1} = R(t_{k+1}, phi(t_{k+1}; t_k, x_k)),
 
-closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1. These equations contain no division by an
-impact speed, so they are as regular at grazing as elsewhere. Beyond grazing, their
-solutions continue as motions through the constraint, which `seen` detects.
+closed by t_{m+1} = t_1 + n T, x_{m+1} = x_1 with n forcing periods T. These equations
+contain no division by an impact speed, so they are as regular at grazing as elsewhere.
+Beyond grazing, their solutions continue as motions through the constraint, which `seen`
+detects.
 """
 
 import abc
@@ -30,7 +31,9 @@ from ._lowest_gap import gap_or_speed, lowest_times, nodes_of
 
 
 class Seen(NamedTuple):
-    """Admissibility of a solution of the shooting equations, and its flights."""
+    """Quantities that decide whether a solution of the shooting equations is
+    admissible, and the flights from which they are computed.
+    """
 
     gaps: Float[Array, " flights"]
     """Lowest gap within each flight, or in the entire orbit if there are no impacts,
@@ -41,7 +44,7 @@ class Seen(NamedTuple):
     error: Float[Array, ""]
     """Estimated error of the flights, relative to 1 + |x|."""
     gap_size: Float[Array, ""]
-    """Scale of the gaps, in their units."""
+    """Scale of the gaps, in the unit of the gaps."""
     times: Float[Array, "flights nodes"]
     """Times at the ends of all steps (s), shape `(flights, 1 + steps)`."""
     states: Float[Array, "flights nodes n"]
@@ -208,7 +211,7 @@ class AbstractShooting(eqx.Module):
         Args:
             system: The system.
             starts: Starts of the flights, `(rows, 1 + n)`.
-            ends: End times, `(rows,)` (s).
+            ends: Ends of the flights, `(rows, 1 + n)`; only their times (s) are used.
 
         Returns:
             Shape `(rows, n)`.

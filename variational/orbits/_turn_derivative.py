@@ -86,7 +86,7 @@ def by_product(system, values, where, state, pieces: TurnPieces, sticks):
 def by_flow(
     system, values, where, state, t0, period, settings: Settings, sticks: bool
 ) -> TurnDerivative:
-    """Differentiate the event loop over one period."""
+    """Return the derivatives over one period from differentiating the event loop."""
     made = _by_flow(system, values, where, state, t0, period, as_arrays(settings))
     by_state, by_start, by_length, by_parameter = made
     return TurnDerivative(

@@ -26,22 +26,24 @@ def damped_step(problem, columns, blocks, point, damping, prior):
     for r, (place, local) in enumerate(zip(columns.place, columns.local)):
         used = place >= 0
         values[r, local[used]] += change[place[used]] * columns.scale[place[used]]
-    # prediction of the quadratic model of the cost for the full step
+    # the decrease of the cost that its quadratic model predicts for the full step
     gain = float(change @ score) + _state_gain(blocks, found)
     moved = Point(jnp.asarray(values), point.states + states)
     return moved, gain
 
 
 def _state_gain(blocks: Blocks, found) -> float:
-    """Return the gain of the states alone: scores times steps at unchanged
-    parameters.
+    """Return the predicted decrease of the cost due to the states at unchanged
+    parameters: the product of their scores and steps.
     """
     none = jnp.zeros((found.score.shape[0], found.score.shape[1]))
     return float(jnp.sum(blocks.s * state_steps(found, none)))
 
 
 def _bounded(problem, columns, point, information, score, damping):
-    """Compute the damped step; values that would pass a bound are held at it."""
+    """Return the damped step of the free values; a value that would pass a bound is
+    held at that bound.
+    """
     size = len(columns.scale)
     change = np.zeros(size)
     if not size:
@@ -63,7 +65,7 @@ def _bounded(problem, columns, point, information, score, damping):
         try:
             change[open_] = np.linalg.solve(damped[np.ix_(open_, open_)], right)
         except np.linalg.LinAlgError:
-            # singular to within rounding: more damping is needed
+            # the matrix is singular to within rounding: more damping is needed
             return np.full(size, np.nan)
         beyond = open_ & ((change < low) | (change > high))
         if not np.any(beyond):

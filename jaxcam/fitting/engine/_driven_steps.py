@@ -12,12 +12,12 @@ from ...recordings.cut import Drive
 from ._model import DriveState, Numbers
 
 
-# Ends of the steps of each piece of each recording
+# Times at which the steps of each piece of each recording begin and end
 Edges: TypeAlias = Float[np.ndarray, "r k n1"]
 
 
 def drive_at(segments: Sequence[Segments], times) -> DriveState:
-    """Return the motion of each recording's drive, in the shape of `times`."""
+    """Return the motion of each recording's drive at `times`, in the same shape."""
     angle, rate = np.zeros(times.shape), np.ones(times.shape)
     acceleration = np.zeros(times.shape)
     for row, part in enumerate(segments):
@@ -46,8 +46,8 @@ def mean_rates(segments: Sequence[Segments], edges: Edges):
 
 
 def input_at(segments: Sequence[Segments], channel: str, times) -> DriveState:
-    """Return the input of each recording, held since the last sample, in the shape of
-    `times`.
+    """Return the input of each recording at `times`, in the same shape; each sample is
+    held until the next.
     """
     found = np.zeros(times.shape)
     for row, part in enumerate(segments):
@@ -97,8 +97,9 @@ class DriveError(NamedTuple):
     A system without a field for the acceleration is driven at a uniform rate. For a
     base that moves with the drive, the forces due to an acceleration are as large as
     those due to an error of `acceleration / (2 rate)` in the rate. These forces act for
-    as long as the rate changes, which is longer than a piece; the last two errors are
-    enlarged accordingly.
+    as long as the rate changes, which is longer than a piece, so they are nearly the
+    same in several consecutive pieces. Since a fit treats the errors of the pieces as
+    independent, the last two errors are enlarged accordingly.
     """
 
     angle: Numbers
@@ -116,13 +117,13 @@ class DriveError(NamedTuple):
 
 
 def drive_error(segments: Sequence[Segments], steps: int) -> DriveError:
-    """Return the errors of the drives, for pieces of some number of samples."""
+    """Return the errors of the drives, for pieces of `steps` samples."""
     rows = [_errors(part, steps * part.recording.interval) for part in segments]
     return DriveError(*np.array(rows).T)
 
 
 def _errors(part: Segments, length: float) -> tuple[float, ...]:
-    """Return the errors of one drive for pieces of some `length` (s)."""
+    """Return the errors of one drive, for pieces of the given `length` (s)."""
     if part.drive is None:
         return (0.0,) * len(DriveError._fields)
     interval = part.recording.interval
@@ -138,10 +139,13 @@ def _errors(part: Segments, length: float) -> tuple[float, ...]:
 
 
 def _unsteadiness(drive: Drive, length: float) -> float:
-    """Return the error of the rate (rad/s) that represents its neglected changes."""
+    """Return the error of the rate (rad/s) by which a fit represents neglected changes
+    of the rate.
+    """
     slow = drive.acceleration
     square = float(np.mean(slow.values**2)) - 2 * slow.stderr**2
-    # a few independent values scatter by about as much as their mean
+    # twice the noise is subtracted, because the mean square of a few independent values
+    # may exceed its expectation by about as much as the expectation itself
     if square <= 0:
         return 0.0
     acceleration = np.sqrt(square)

@@ -13,7 +13,7 @@ from ...hybrid.caches import Cache
 
 
 T = TypeVar("T")
-# kinds of arguments for which the program is compiled
+# kinds of arguments for which a program has been compiled
 _COMPILED = Cache(4096)
 
 
@@ -43,12 +43,14 @@ def each_record(function: Callable[[int], T], records: int, args: Any) -> T:
             parts = [*first, *pool.map(ready, rest)]
     else:
         parts = [*first, *map(function, rest)]
-    # stacked by numpy: JAX would compile a program for each shape
+    # stack with NumPy, because JAX would compile a program for each shape
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *parts)
 
 
 def kinds(args) -> Hashable:
-    """Return what a compiled program depends on: shapes, types and static values."""
+    """Return the properties of the arguments on which a compiled program depends:
+    shapes, types and static values.
+    """
 
     def kind(leaf) -> Hashable:
         if hasattr(leaf, "shape"):

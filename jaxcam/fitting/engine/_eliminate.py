@@ -82,11 +82,12 @@ def _eliminate(blocks: Blocks, part):
     size, width = blocks.sp.shape[1:]
 
     def forwards(carry, inputs):
-        # information of the previous pieces on this piece's state, on the parameters,
-        # and on both
+        # the previous pieces contribute to the information of this piece's state
+        # (`ss`), to its coupling with the parameters (`sp`) and to its score (`s`); the
+        # last two are the information and score of the parameters so far
         ss, sp, s, information, score = carry
         here_ss, here_sp, here_s, after = inputs
-        # an unconstrained state does not move
+        # a state without information gets a unit diagonal, so that it does not move
         diagonal = jnp.diagonal(here_ss)
         least = jnp.where(diagonal > 0, part * diagonal, 1.0)
         matrix = here_ss + ss + jnp.diag(least)

@@ -19,9 +19,9 @@ from ._parameter import Parameter
 def known_constants(
     model: Model, recordings: Sequence[Recording]
 ) -> tuple[Parameter, ...]:
-    """Create a parameter for each name in the `constants` of recordings.
+    """Return a parameter for each name in the `constants` of recordings.
 
-    If a recording does not contain a constant, the value of the model is used.
+    If a recording does not state a constant, the value of the model is used.
 
     **Raises:** `RecordingError` if a name is not a number of the system, or a value is
     not a number.

@@ -69,8 +69,8 @@ class Expansion(eqx.Module):
     The quantities needed at every step are computed and differentiated once, instead of
     in each piece.
 
-    - `slopes`: derivatives of each leaf, a row for each parameter; None if the leaf
-        depends on none.
+    - `slopes`: derivatives of each leaf, with one row per parameter; None if the leaf
+        depends on no parameter.
     """
 
     model: Model

@@ -11,7 +11,8 @@ from jaxtyping import Array, Float
 from ._model import Sensor
 
 
-# Largest deviation of a sample from its interval, in standard deviations of the noise
+# Distance of a prediction from the interval of a rounded sample, in standard deviations
+# of the noise, beyond which the information follows from the slope of the cost
 _FAR = 5.0
 
 
@@ -45,7 +46,7 @@ def score(sensor: Sensor, value, predicted) -> Scored:
 def _within(sensor: Sensor, value, predicted) -> Scored:
     off = value - predicted
     if not math.isinf(sensor.tails):
-        # Student's distribution, with the total width of noise and rounding
+        # Student's distribution, scaled by the standard deviation of noise and rounding
         nu, variance = sensor.tails, sensor.floor**2
         square = off * off / variance
         return Scored(
@@ -68,7 +69,8 @@ def _rounded(sensor: Sensor, off) -> Scored:
     noise.
     """
     half = sensor.resolution / 2 / sensor.noise
-    # evaluated by symmetry in the lower tail, where differences remain accurate
+    # the probability is evaluated in the lower tail (by symmetry), where the difference
+    # of the two distribution functions remains accurate
     z = -jnp.abs(off) / sensor.noise
     high, low = log_ndtr(z + half), log_ndtr(z - half)
     chance = high + jnp.log1p(-jnp.exp(low - high))
@@ -78,8 +80,9 @@ def _rounded(sensor: Sensor, off) -> Scored:
     variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
     slope = -jnp.sign(off) * pull / sensor.noise
-    # far from the interval, where only bad starts lead, the cost is steeper than the
-    # mean information predicts, and a step based on that alone would go too far
+    # only poor starting values lead this far from the interval; there, the cost is
+    # steeper than the mean information predicts, so a step based on the mean
+    # information would be too long
     far = jnp.abs(off) > sensor.resolution / 2 + _FAR * sensor.noise
     safe = jnp.where(far, off, 1.0)
     information = jnp.where(far, slope / safe, 1 / variance)
@@ -91,7 +94,7 @@ def _beyond(sensor: Sensor, value, predicted) -> Scored:
     z = (jnp.sign(value) * predicted - sensor.limit) / sensor.noise
     chance = log_ndtr(z)
     ratio = jnp.exp(_log_density(z) - chance)
-    # curvature of the logarithm of Phi; its mean is the information
+    # minus the second derivative of log Phi; its expected value is the information
     bend = ratio * (z + ratio)
     return Scored(
         -2 * chance,
@@ -105,7 +108,7 @@ def _log_density(z):
 
 
 def score_all(sensors, values, predicted) -> Scored:
-    """Evaluate all channels, along the last axis."""
+    """Evaluate the likelihood of all channels, which are along the last axis."""
     columns = [
         score(sensor, values[..., k], predicted[..., k])
         for k, sensor in enumerate(sensors)

@@ -22,7 +22,8 @@ class Sharpness(NamedTuple):
     """Standard errors of the joints of one recording, and of the state of a typical
     piece.
 
-    `apart` is the factor on the errors of joints that separates the pieces.
+    Multiplied by the factor `apart`, the errors of the joints are so large that each
+    piece is fitted separately.
     """
 
     flight: Float[Array, "k n"]
@@ -33,8 +34,8 @@ class Sharpness(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """Further arguments of a program: reference states in contact and the errors of the
-    joints.
+    """Further arguments of a compiled program: reference states in contact and the
+    errors of the joints.
 
     `weight` `(r, k)` and `rest_weight` `(r, kc)` are the weights of the data of each
     piece.
@@ -62,11 +63,17 @@ class LinearPieces(NamedTuple):
     p: Float[Array, " m"]
     """Gradient of the cost of these samples, shape `(m,)`."""
     later: Float[Array, "k e n"]
-    """Rows of each joint for the state after the joint, in units of its error."""
+    """Derivatives of each joint's mismatch with respect to the state after the joint,
+    in units of the error of the joint.
+    """
     earlier: Float[Array, "k e a"]
-    """Rows of each joint for the columns of the previous piece, in the same units."""
+    """Derivatives of each joint's mismatch with respect to the columns of the previous
+    piece, in the same units.
+    """
     direct: Float[Array, "k e m"]
-    """Rows of each joint for all other variables, in the same units."""
+    """Derivatives of each joint's mismatch with respect to the parameters at fixed
+    states, in the same units.
+    """
     tied: Float[Array, "k e"]
     """Mismatch at each joint, in units of its error."""
     flown_cost: Float[Array, " k"]
@@ -89,8 +96,8 @@ def linear_pieces(
 
     Args:
         model_at: `model_at(change, start, step)` is the model of a piece that begins at
-            `start` with steps of length `step`, where `change` `(m,)` is zero at the
-            point.
+            `start` with steps of length `step`, where `change` `(m,)` is the change of
+            the parameters from the point.
         pieces: The pieces.
         extras: Further arguments of the compiled programs.
         states: States at the beginning of each piece.
@@ -106,7 +113,7 @@ def linear_pieces(
     end, end_rows, flown_cost, information, slope = found
     pp, p, rested_cost = _linear_contacts(model_at, pieces, extras, origin)
 
-    # rows for the earlier state, the later state and all other variables
+    # derivatives with respect to the earlier state, the later state and the parameters
     def joint_of(before, state, t, *inputs):
         def off(before, state, change):
             model = model_at(change, t, jnp.ones_like(t))
@@ -193,8 +200,8 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
 
 
 def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, origin):
-    """Return information, score and cost of the pieces in contact, for the parameters
-    alone.
+    """Return the information and score of the parameters from the pieces in contact,
+    and the cost of each piece.
     """
     width = len(origin)
     if not len(pieces.rest_exists):
@@ -309,7 +316,7 @@ def _flat(joint):
 
 
 def strength(sharpness: Sharpness, kind):
-    """Return the inverse error of each component of a joint, zero if there is no
+    """Return the inverse of the error of each component of a joint; zero if there is no
     joint.
     """
     error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)

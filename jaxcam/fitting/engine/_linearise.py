@@ -38,9 +38,9 @@ class Point(NamedTuple):
 class Blocks(NamedTuple):
     """Normal equations of the pieces of one recording: information and score.
 
-    `ss, sp, s` belong to the state of each piece; `pp, p` to the parameters, summed
-    over all pieces and joints; `before` couples the state of a piece to that of the
-    previous one.
+    `ss`, `sp` and `s` belong to the state of each piece; `pp` and `p` belong to the
+    parameters and are summed over all pieces and joints; `before` couples the state of
+    a piece to that of the previous piece.
     """
 
     ss: Float[Array, "k n n"]
@@ -106,7 +106,7 @@ def assemble(
 @program
 def assemble_one(near, pieces, extras, states, columns, scales, row, shown):
     """Apply `assemble` to one recording; its index `row` is an argument of the compiled
-    program, not a constant.
+    program, so that one program serves all recordings.
     """
     one = pieces, extras, states, columns, scales
     pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
@@ -129,7 +129,8 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 
 def _predicted(layout, pieces, extras, point):
-    # the same number for all recordings, so that their loops can be run as one
+    # the number of substeps is the same for all recordings, so that their loops can be
+    # run as one
     substeps = jnp.max(pieces.substeps)
 
     def record(pieces, extras, values, states):
@@ -149,7 +150,9 @@ def _predicted(layout, pieces, extras, point):
 
 @program
 def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Costs:
-    """Return costs without derivatives; can be differentiated in reverse mode."""
+    """Return the costs alone, without scores or information; this function can be
+    differentiated in reverse mode.
+    """
     seen, resting, off = _predicted(layout, pieces, extras, point)
     sensors = tuple(layout.model.sensors.values())
 

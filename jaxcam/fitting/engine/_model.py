@@ -89,7 +89,7 @@ class Sensor(eqx.Module):
         return jnp.asarray(self.observe(state))
 
 
-# numpy during assembly, JAX in the programs
+# NumPy arrays while the pieces are assembled, JAX arrays in the compiled programs
 Numbers: TypeAlias = Array | np.ndarray
 
 

@@ -22,8 +22,8 @@ from ...hybrid.surface import (
 )
 
 
-# A slip velocity below this fraction of the change that friction can cause within a
-# piece may be zero
+# An estimated slip velocity may actually be zero if it is below this fraction of the
+# change that friction can cause within a piece
 _STOPPED = 0.01
 
 
@@ -49,7 +49,9 @@ class Surfaces(NamedTuple):
 
 
 def surfaces_in(system: HybridSystem, t, x) -> Surfaces:
-    """Return the number of surfaces, and the components that change at them."""
+    """Return the number of surfaces, and the components of the vector field that change
+    at each of them.
+    """
     assert isinstance(system, SwitchedSystem)
     values, static = eqx.partition(system, eqx.is_inexact_array)
     shapes, time, state = jax.eval_shape(lambda *a: a, values, t, x)
@@ -94,20 +96,26 @@ def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
 
 
 def on_side_of(system: HybridSystem, t, x) -> HybridSystem:
-    """Return a system whose field is smooth near a state: the branch on its side."""
+    """Return a system whose field is smooth near a state: the branch on the side of the
+    surfaces on which the state lies.
+    """
     if not isinstance(system, SwitchedSystem):
         return system
     return OnSides(system, jax.lax.stop_gradient(system.sides(t, x)) < 0)
 
 
 def distances_along(system: InMode, t, x, rate):
-    """Return switching distances and, if `x` changes at `rate`, their rates, `(k,)`."""
+    """Return the switching distances `(k,)`, and their rates of change if `x` changes
+    at `rate`.
+    """
     along = jnp.ones_like(t), rate
     return jax.jvp(lambda s, y: switching_distances(system, s, y), (t, x), along)
 
 
 def state_after(system: InMode, t, x, ends: Bool[Array, " k"]) -> Float[Array, " n"]:
-    """Return the state after the event at one surface: reset, if it is a crossing."""
+    """Return the state after the event at one surface; it is reset if the event is a
+    crossing.
+    """
     rows = resets(OnSides(system.system, system.negative), t, x)
     landed = jnp.sum(jnp.where(ends[:, None], rows, 0.0), axis=0)
     return jnp.where(jnp.any(ends & ~system.sliding), landed, x)
@@ -118,8 +126,9 @@ def mode_after(
 ) -> Mode:
     """Return the mode after the event at one surface.
 
-    A crossing changes the side; if the branch beyond the surface points back, the
-    motion slides. Sliding ends on the side whose weight has reached one.
+    A crossing changes the side; if the vector field beyond the surface points back to
+    it, the motion slides. When sliding ends, the motion continues on the side whose
+    weight has reached one.
 
     Args:
         known: The surfaces.
@@ -127,7 +136,7 @@ def mode_after(
         t: Time of the event (s).
         x: State before the event, shape `(n,)`.
         after: State after the event, shape `(n,)`.
-        ends: The surface, shape `(k,)`.
+        ends: Whether each surface is the one at which the event occurs, shape `(k,)`.
 
     Returns:
         The mode.
@@ -144,7 +153,8 @@ def mode_after(
     # static friction stops a motion that kinetic friction would not reverse
     slack = slack_of_hold(system)
     back = rate <= jnp.maximum(-before, 0.0) * slack / (1 + slack)
-    # with hysteresis, the other threshold is a finite distance away
+    # with hysteresis, the other threshold is a finite distance away, so the motion does
+    # not slide
     apart = jnp.broadcast_to(jnp.asarray(system.system.hysteresis), back.shape) > 0
     arrives = ends & ~slid & back & ~apart & jnp.array(slidable)
     return Mode(left.negative, left.sliding | arrives)

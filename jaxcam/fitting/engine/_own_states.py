@@ -18,16 +18,18 @@ from ._predict import after_impact
 from ._sharpness import states_only
 
 
-# State directions with less than this fraction of the largest information are held
+# Directions in state space with less than this fraction of the largest information are
+# held fixed
 _BLIND = 1e-10
 # Number of samples needed to determine the curvature of a piece
 _FEW = 24
-# Cost of a sample above which a start is rejected: three times the noise
+# Mean cost per sample above which the model counts as far from the samples: residuals
+# of three times the noise
 _FAR = 9.0
-# Damped steps from each start
+# Maximum number of damped steps from each start
 _STEPS = 12
-# The iteration ends after this many steps that reduce no cost by more than this
-# fraction
+# The iteration ends after this many consecutive steps that reduce the cost of no piece
+# by more than this fraction
 _QUIET, _LITTLE = 3, 1e-3
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-3, 1e-9
 
@@ -132,8 +134,8 @@ def _step(blocks, damping):
 
 @program
 def _ends(layout: Layout, pieces: Pieces, point: Point):
-    """Return the state of each piece at its end, and the state after an impact
-    there.
+    """Return the state at the end of each piece, and the state that an impact at that
+    time would produce.
     """
     substeps = jnp.max(pieces.substeps)
 

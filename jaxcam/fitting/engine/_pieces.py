@@ -21,12 +21,12 @@ from ._model import DriveState, Numbers
 from ._piece_length import bearable_length
 
 
-# Maximum number of samples in a piece: enough for its own initial state, short compared
-# with the time over which impacts magnify an error
+# Maximum number of samples in a piece: enough to determine its own initial state, but a
+# short time compared with that over which impacts magnify an error
 _PIECE = 100
-# A flight with fewer samples than the first number gives no information by itself; for
-# a flight between two impacts, the second number of samples suffices, which determine
-# its velocity and thus link the flights before and after it
+# A flight with fewer samples than the first number gives no information by itself.
+# Between two impacts, the second number of samples suffices: these samples determine
+# the velocity of the flight, which links the flights before and after it
 _LEAST, _TIED = 8, 3
 # The number of samples in a step is rounded up to a multiple of this
 _SHARED = 4
@@ -34,7 +34,7 @@ _SHARED = 4
 # records share a program; if a piece has more steps than the last number, padding takes
 # longer than compiling, and the second number is used
 _PADDED, _LESS_PADDED, _FEW_STEPS = 64, 8, 20
-# predecessor of a piece
+# Kinds of predecessor of a piece: none, a piece of the same flight, or an impact
 FREE, FLIGHT, IMPACT = 0, 1, 2
 # Half-width (samples) of the search for the time of an impact about the recorded one
 _REACH = 20.0
@@ -59,11 +59,11 @@ class Pieces(eqx.Module):
 
     - `flown`, `rested`: samples in flight and in contact.
     - `joint`: the predecessor of each piece of flight: nothing, flight, or an impact.
-    - `exists`: false where padded.
+    - `exists`, `rest_exists`: false for padding.
     - `drive` `(r, k, n)`: angle and acceleration of the drive in the middle of each
         step, and its mean rate; or the mean and slope of an input. `drive_at` `(r, k)`:
-        its motion at the beginning of each piece. `rest_drive` `(r, kc, n + 1)`: its
-        motion at each node of contact.
+        motion of the drive at the beginning of each piece. `rest_drive` `(r, kc, n +
+        1)`: motion of the drive at the ends of the steps of each piece in contact.
     - `reach`: largest deviation (s) of an impact from its recorded time.
     - `drive_error`: standard errors of each recording's drive.
     - `substeps` `(r,)`: number of parts into which a prediction divides each step, the
@@ -104,8 +104,9 @@ def spans(
 ) -> tuple[list[Span], list[Span]]:
     """Return the pieces of flight and of contact of one recording.
 
-    **Arguments:** pieces of an oscillation are shorter, as determined from the channels
-    `curved` (default: the segmented channel). Without `rests`, contacts are omitted.
+    **Arguments:** `curved` are the channels in which a piece must not be longer than
+    half an oscillation (default: the segmented channel). Without `rests`, contacts are
+    omitted.
     """
     record = segments.recording
     time, interval = record.time, record.interval
@@ -145,7 +146,8 @@ def spans(
     rested = []
     for number, contact in enumerate(segments.contacts if rests else ()):
         rows = np.flatnonzero(segments.resting(contact) & valid)
-        # divided by time: if little of a contact is certain, its samples are far apart
+        # divide a contact by time, not by number of certain samples, because these may
+        # be far apart
         whole = np.arange(rows[0], rows[-1] + 1) if len(rows) else rows
         for stretch in np.array_split(whole, max(1, -(-len(whole) // _PIECE))):
             block = np.intersect1d(stretch, rows, assume_unique=True)
@@ -172,7 +174,7 @@ def _margin(edge, interval: float) -> float:
         return edge.stderr
     error = edge.stderr if np.isfinite(edge.stderr) else interval
     least = interval / 2 + 2 * min(error, 2 * interval)
-    # a flight that began too early would be fitted to samples of the contact
+    # if the margin were too small, a flight would be fitted to samples of the contact
     return max(least, error) if edge.kind == "release" else least
 
 
@@ -184,15 +186,15 @@ def gather(
     curved: Sequence[str] | None = None,
     rests: bool = True,
 ) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
-    """Gather pieces of some recordings, padded so that similar recordings share a
-    program.
+    """Gather the pieces of all recordings, padded so that similar recordings share a
+    compiled program.
 
     **Arguments:** `measured` is the channel of an input, in place of a drive; `curved`
     and `rests` are those of `spans`.
 
     **Raises:** `RecordingError` if there is nothing to fit.
     """
-    # the curvature due to a measured input is known
+    # the curvature due to a measured input is known, so it does not limit the pieces
     curved = curved if measured is None else ()
     cuts = [spans(part, curved, rests) for part in segments]
     if not any(flown for flown, _ in cuts):
@@ -203,7 +205,7 @@ def gather(
         )
     multiple = _PADDED if steps <= _FEW_STEPS else _LESS_PADDED
     width = multiple * -(-max(len(flown) for flown, _ in cuts) // multiple)
-    # zero without contacts, so that the program for contacts is not compiled
+    # zero if there are no contacts, so that the program for contacts is not compiled
     resting = 32 * -(-max(len(rested) for _, rested in cuts) // 32)
     most = max(_most_in_a_step(part, cut, steps) for part, cut in zip(segments, cuts))
     both = [

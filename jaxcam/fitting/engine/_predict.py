@@ -20,9 +20,9 @@ _NEWTON = 4
 
 
 class Nodes(NamedTuple):
-    """Channels before gain, offset and lag, at both ends of each step.
+    """Values and rates of the channels at both ends of each step.
 
-    They are `left` and `right` `(n, c)`, and their rates of change.
+    Gain, offset and lag of the sensors are not yet applied.
     """
 
     left: Float[Array, "n c"]
@@ -34,10 +34,10 @@ class Nodes(NamedTuple):
 def fly(model: Model, state, start, step, drive: DriveState, substeps: Any = 1):
     """Integrate one piece of flight by the classical Runge-Kutta method.
 
-    With `substeps`, a number or an integer array, each step is divided for the values,
-    but not for the derivatives, which need far fewer digits and cost far more.
+    Each step is divided into `substeps` parts (a number or an integer array) for the
+    values, but not for the derivatives, which need far fewer digits and cost far more.
 
-    **Returns:** the state at its end `(n,)`, and its `Nodes`.
+    **Returns:** the state at the end of the piece `(n,)`, and its `Nodes`.
     """
     if isinstance(model.system, SwitchedSystem):
         states, fields, *_ = switched_nodes(model, state, start, step, drive, substeps)
@@ -175,7 +175,7 @@ def contact_state(system, t, guess):
 
 
 def _least(slopes, residual):
-    """Return the smallest step that changes two conditions by a residual."""
+    """Return the smallest step that changes the two conditions by `residual`."""
     (a, b), (_, d) = slopes @ slopes.T
     det = a * d - b * b
     first, second = residual
@@ -203,8 +203,8 @@ def samples(
 ):
     """Sample every channel, shape `(n, m, c)`, by cubic Hermite polynomials.
 
-    **Arguments:** the calibration of the sensors; the position `along` each step at
-    which the drive is given, and the drive there.
+    **Arguments:** `sensing` is the calibration of the sensors; `along` contains a time
+    in each step, and the drive at that time.
     """
     u = place[..., None]
     left, right = nodes.left[:, None], nodes.right[:, None]

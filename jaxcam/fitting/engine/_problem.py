@@ -4,8 +4,8 @@
 contacts and impacts. Every flight is divided into pieces of at most 100 samples and
 about half a period of the oscillation that it contains. Each piece has its own initial
 state and is predicted from it alone, in parallel with all others, so that no prediction
-exceeds the predictable time, even in a chaotic recording. Pieces are connected by
-joints, whose conditions follow from the model:
+extends beyond the time over which the motion is predictable, even in a chaotic
+recording. Pieces are connected by joints, whose conditions follow from the model:
 
 - within a flight, a piece begins where the previous one ends;
 - at an impact, two flights meet at the instant at which their gaps are equal (an event,
@@ -173,9 +173,11 @@ class Problem:
                 values[:, column] = one.known
         measured = model.drive.channel if isinstance(model.drive, Input) else None
         steps = _STEPS
-        # filtered channels are smooth even where the motion is not
+        # filtered channels are smooth even where the motion is not, so they cannot show
+        # how short the pieces must be
         curved = [name for name in model.sensors if not model.sensors[name].filtered]
-        # contact does not show which of several coordinates are at rest
+        # with several coordinates, a contact does not show which of them are at rest,
+        # so contacts are used only for a single coordinate
         rests = state_size(model) <= 2
         while True:
             pieces, cuts = gather(
@@ -242,12 +244,12 @@ class Problem:
         )
 
     def everything(self) -> Weights:
-        """Return weights with which all data count once."""
+        """Return weights that count all data once."""
         exists, rests = self.pieces.exists, self.pieces.rest_exists
         return Weights(np.asarray(exists, float), np.asarray(rests, float))
 
     def only(self, records: Iterable[str]) -> Weights:
-        """Return weights with which only some recordings count."""
+        """Return weights that count only the given recordings."""
         wanted = set(records)
         if not wanted <= set(self.records):
             raise ValueError(
@@ -259,8 +261,8 @@ class Problem:
         return Weights(every.flown * keep[:, None], every.rested * keep[:, None])
 
     def between(self, start: float, stop: float) -> Weights:
-        """Return weights with which only pieces that begin in a time span (s, in each
-        recording) count.
+        """Return weights that count only the pieces of each recording that begin in a
+        time span (s).
         """
 
         def inside(samples):

@@ -42,7 +42,9 @@ def _rates(layout: Layout, point: Point, pieces: Pieces):
 
 
 def refuse_hysteresis(model: Model) -> None:
-    """Raise `ValueError` for a system whose side at the start of a piece is unknown."""
+    """Raise `ValueError` for a system with hysteresis: its side of a surface at the
+    start of a piece is unknown.
+    """
     system = model.system
     if isinstance(system, SwitchedSystem) and np.any(np.asarray(system.hysteresis) > 0):
         raise ValueError(

@@ -36,7 +36,8 @@ def shows_directly(layout: Layout, pieces: Pieces, columns, scales) -> bool:
 
 def seen_directly(layout: Layout, pieces: Pieces) -> tuple[bool, ...]:
     """Return for each parameter whether a sample depends on it at given nodes of the
-    motion and a given calibration of the sensors, as in the `error` of a sensor.
+    motion and a given calibration of the sensors, as it does if the `error` of a sensor
+    contains the parameter.
     """
     *_, n, m, c = pieces.flown.value.shape
     key = kinds((layout, n, m, c))

@@ -24,8 +24,9 @@ _IMPACT = 10**-0.5
 # Error of a joint, relative to that of a single piece, above which it counts as loose
 _LOOSE = 0.1
 _WIDTH = 4
-# Number of columns above which the width of a program follows the number of free
-# parameters, and the difference between widths
+# Number of columns up to which a program has a column for every parameter; beyond it,
+# the width is the number of free parameters, rounded up to a multiple of the second
+# number
 _MANY, _STRIDE = 64, 32
 # Number of steps of a piece up to which one program is used for states and parameters
 _FEW_STEPS = 20
@@ -41,8 +42,9 @@ def width_of(number: int) -> int:
 def shared_width(free: int, most: int) -> int:
     """Return the number of columns of a program for a subset of the parameters.
 
-    A small set is always computed completely, so that one program suffices for every
-    choice; a large set is rounded up to a multiple of 32.
+    With few parameters in total (`most`), there is a column for each of them, so that
+    one program serves every subset; otherwise, the number of free parameters is rounded
+    up to a multiple of 32.
     """
     whole = width_of(most)
     return whole if whole <= _MANY else min(whole, _STRIDE * -(-free // _STRIDE))
@@ -64,13 +66,13 @@ def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extr
     blocks, _ = states_only(layout, alone, extras, point)
     information = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
     usual = jnp.nanmedian(jnp.where(information > 0, information, jnp.nan), axis=(0, 1))
-    # an unobserved state is connected as tightly as the least observable state
+    # an unobserved state component is connected as tightly as the least observable one
     usual = jnp.where(jnp.isnan(usual), jnp.nanmin(usual), usual)
     floor = JOINT / jnp.sqrt(usual)
     flight = jnp.broadcast_to(floor, one.shape)
     piece = flight / JOINT
     if np.any(np.asarray(pieces.drive_error.angle) > 0):
-        # a component determined by the drive is known as accurately as the drive
+        # a component determined by the drive is known only as accurately as the drive
         by_drive = _drive_in_flight(layout, pieces, point)
         flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
     sharp = extras._replace(
@@ -92,9 +94,9 @@ def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Return normal equations of the states, with all parameters held, and the
     costs.
     """
-    # as wide as a fit of all parameters, whose program is then already compiled unless
-    # a sensor shows one of them directly; for many steps, a separate program soon
-    # repays its compilation time
+    # use the width of a fit of all parameters, so that one program serves both, unless
+    # a sensor shows one of the parameters directly; for many steps, a separate narrow
+    # program soon repays its compilation time
     few = pieces.steps <= _FEW_STEPS
     width = width_of(len(layout.places)) if few else _WIDTH
     none = jnp.zeros((pieces.joint.shape[0], width), dtype=int)
@@ -140,9 +142,9 @@ def separated(extras: Extras) -> Extras:
 def allowing(extras: Extras, part: float) -> Extras:
     """Return joints whose errors are a given multiple of those of separate pieces.
 
-    A model with errors does not predict where a piece begins from the end of the
-    previous piece; `part` is the size of its error relative to that of the state of a
-    single piece.
+    A model with errors cannot predict the initial state of a piece accurately from the
+    end of the previous piece; `part` is the error of this prediction relative to that
+    of the state of a single piece.
     """
     sharp, most = extras.sharpness, max(part, 1.0)
     looser = part * sharp.apart
@@ -158,8 +160,8 @@ def allowing(extras: Extras, part: float) -> Extras:
 
 
 def _variances(ss, before):
-    """Return the variance of each state from the samples of its flight, shape `(r,
-    k, n)`.
+    """Return the variance of each state as determined by the samples of its flight,
+    shape `(r, k, n)`.
     """
     records, width, size, _ = ss.shape
     found = np.zeros((records, width, size))
@@ -183,9 +185,10 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     """Return the error of each piece's initial state, `(r, k, n)`, due to the noise of
     the drive during the previous piece, and to the acceleration of the drive.
 
-    The noise of the samples is independent; that of the smoothed angle, rate and
-    acceleration is not. Integration by parts turns the effect of the rate into one of
-    the angle; the terms at the ends of a piece cancel between neighbours.
+    The noise of the encoder is independent from sample to sample; that of the smoothed
+    angle, rate and acceleration is not. Integration by parts therefore expresses the
+    effect of an error of the rate by that of an error of the angle; the terms at the
+    ends of a piece cancel those of the neighbouring pieces.
     """
 
     def one(values, error, states, start, step, drives):
@@ -215,8 +218,8 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
 
 @program
 def _drive_slopes(layout: Layout, pieces: Pieces, point: Point):
-    """Return the slope of the gap, `(r, k, n)`, and the errors of an impact due to the
-    drive.
+    """Return the derivatives of the gap with respect to the state, `(r, k, n)`, and the
+    errors of an impact due to the drive.
     """
 
     def one(values, state, t, drive, error):

@@ -19,7 +19,9 @@ def state_size(model: Model) -> int:
 
 
 def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
-    """Estimate states by polynomials through the samples, shape `(r, k, n)`."""
+    """Return initial states estimated from polynomials fitted to the samples: those of
+    the pieces in flight, `(r, k, n)`, and reference states for the pieces in contact.
+    """
     size = state_size(model)
     lags = filtered_channels(model)
     sensors = model.sensors
@@ -48,8 +50,8 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
 
 
 def _still(model: Model, part: Segments):
-    """Return the system with its drive at the mean speed; its field is only used as a
-    guide.
+    """Return the system with its drive at the mean speed; its vector field is only used
+    to estimate initial states.
     """
     if part.drive is None:
         return model.system
@@ -57,7 +59,9 @@ def _still(model: Model, part: Segments):
 
 
 def _with_samples(side: list[Span]):
-    """Extend pieces too short for a polynomial by samples of their neighbours."""
+    """Yield the pieces; one with too few samples for a polynomial also gets the samples
+    of its neighbours.
+    """
     for k, span in enumerate(side):
         if len(span.rows) >= 4:
             yield span

@@ -16,16 +16,17 @@ from ._pieces import Pieces
 from ._predict import end_of_flight, fly
 
 
-# Allowed change (in units of the error of a piece's state) when the substeps are halved
+# Allowed change of a state (in units of the error of a piece's state) when the length
+# of the substeps is halved
 _STEP_ERROR = 0.01
 _MOST_SUBSTEPS = 16
 # Allowed error (in units of the noise) of the cubics between the ends of the steps
 _CUBIC_ERROR = 0.05
-# Number of pieces above which the limit decreases, because errors accumulate along a
-# flight
+# Number of pieces in a flight above which the allowed change decreases, because errors
+# accumulate along a flight
 _LONG = 16
-# Step divided by the time constant of a filter; the Hermite error is then 1e-4 of a
-# jump
+# Largest step, relative to the time constant of a sensor filter; the error of the cubic
+# Hermite interpolation is then 1e-4 of a jump
 _FILTER_STEP = 0.4
 # A larger number of steps is rounded up to a multiple of this, so that similar problems
 # share a program
@@ -42,8 +43,9 @@ def steps_for_inputs(model: Model, segments, pieces: Pieces, steps: int) -> int:
     """Return the number of steps of a piece that resolve the input and the sensor
     filters, at least the present number `steps`.
 
-    An input is constant or linear between its samples. After an impact, a filter has
-    not settled, and the initial states do not account for this.
+    A step must not be longer than the interval between the samples of an input. It must
+    also resolve the settling of a filter after an impact, which `followed_by_cubics`
+    does not show, because the estimated initial states assume settled filters.
     """
     longest = steps * float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
     interval = min(part.recording.interval for part in segments)
@@ -75,8 +77,8 @@ def followed_by_cubics(layout: Layout, pieces: Pieces, point: Point) -> bool:
 def enough_substeps(
     layout: Layout, pieces: Pieces, extras: Extras, point: Point, flight: int
 ) -> Pieces:
-    """Return the pieces with enough substeps that doubling these changes all states by
-    less than their errors.
+    """Return the pieces with so many substeps that doubling their number changes every
+    state by much less than its error.
 
     **Arguments:** `flight` is the number of pieces in the longest flight.
     """
@@ -99,7 +101,9 @@ def enough_substeps(
 
 @program
 def _ends(layout: Layout, pieces: Pieces, point: Point, substeps):
-    """Return the states at the ends; one program serves every number of substeps."""
+    """Return the states at the ends of all pieces; one program serves every number of
+    substeps.
+    """
 
     def one(model, *piece):
         return end_of_flight(model, *piece, substeps=substeps)
@@ -112,7 +116,8 @@ def _off_middles(layout: Layout, pieces: Pieces, point: Point):
     """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
 
     def one(model, state, start, step, drive):
-        # the values in the halves of a step, within which drive and input are linear
+        # the drive in the two halves of each step, within which drive and input are
+        # linear
         twice = DriveState(*(jnp.repeat(part, 2, axis=-1) for part in drive))
         quarter = jnp.tile(jnp.array([-0.25, 0.25]), drive.angle.shape[-1]) * step
         twice = twice._replace(angle=twice.angle + quarter * twice.rate)

@@ -28,10 +28,10 @@ from ._modes import (
 )
 
 
-# Events that are located in a piece; pieces are shorter than half an oscillation
+# Maximum number of events located in a piece, which is at most half an oscillation
 EVENTS = 8
-# Runge-Kutta steps that locate an event: one to the end, one of length zero, and those
-# of the Illinois method
+# Maximum number of Runge-Kutta steps that locate an event: one to the end, one of
+# length zero, and those of the Illinois method
 _SEARCH = 10
 
 
@@ -257,7 +257,7 @@ class _Reached(NamedTuple):
 
 
 def _first_event(steps: _Steps, number, t, x, mode: Mode, left, wanted) -> _Reached:
-    """Return the first event within some time, or the motion at its end.
+    """Return the first event within the time `left`, or the motion at its end.
 
     Among the distances that are negative at the end, the smallest one crosses zero at
     the first event.
@@ -276,7 +276,7 @@ def _first_event(steps: _Steps, number, t, x, mode: Mode, left, wanted) -> _Reac
         least = jnp.argmin(jnp.where(crossed, distances, jnp.inf))
         value, last = distances[least], (least, trial, there)
         beyond = (value < 0) & (turn != 1)
-        # Illinois method: if an end is kept twice, its value is halved
+        # Illinois method: if an end of the bracket is kept twice, its value is halved
         low_kept = jnp.where((turn > 2) & beyond & (kept == 1), low / 2, low)
         high_kept = jnp.where((turn > 2) & ~beyond & (kept == 2), high / 2, high)
         return (
@@ -340,11 +340,12 @@ def _integrated(steps: _Steps, state, parts: Part):
         distances, slopes = distances_along(system, t, there[:size], before[:size])
         distance = jnp.sum(jnp.where(part.ends, distances, 0.0))
         slope = jax.lax.stop_gradient(jnp.sum(jnp.where(part.ends, slopes, 0.0)))
-        # where the motion hardly approaches the surface, the time is not differentiated
+        # if the motion hardly approaches the surface, do not differentiate the event
+        # time
         slope = jnp.where(slope < 0, slope, -jnp.inf)
         later = -(distance - jax.lax.stop_gradient(distance)) / slope
         event, at_once = jnp.any(part.ends), part.length == 0
-        # an event that another one causes moves with that one
+        # an event caused by another event shifts with it
         later = jnp.where(at_once & (moved_by[1] > 0), moved_by[0], later)
         kept = jnp.where(at_once, moved_by, 0.0)
         moved_by = jnp.where(event, jnp.stack([later, 1.0]), kept)

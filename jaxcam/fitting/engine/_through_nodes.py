@@ -58,7 +58,7 @@ def normal_through(
     Args:
         nodes: Derivatives of the nodes with respect to the columns, each `(n, c, a)`.
         sensing: Derivatives of the calibration, each `(c, a)`.
-        shares: From `shares_of`.
+        shares: Derivatives of each sample, from `shares_of`.
         information: Information of each sample.
         score: Score of each sample.
 

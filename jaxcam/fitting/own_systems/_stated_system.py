@@ -94,7 +94,8 @@ def _as_declared(
     """
     kind, default = declared.annotation, declared.default
     if isinstance(value, float):
-        # an integer such as a number of teeth, used as a loop bound
+        # a field declared as an integer, such as a number of teeth, may be a loop bound
+        # and must stay an integer
         whole = kind in (int, "int") and value.is_integer()
         return int(value) if whole and not varies else value
     numbers = float | int | jax.Array

@@ -17,7 +17,7 @@ from ...recordings.files import printable
 
 # maximum number of characters quoted from the message of another error
 _MOST = 200
-# programs are compiled for classes, so an unchanged file must not create new ones
+# programs are compiled for each class, so an unchanged file must not create new classes
 _loaded: dict[Path, tuple[bytes, ModuleType]] = {}
 
 
@@ -122,10 +122,11 @@ def _module(file: Path) -> ModuleType:
     module = ModuleType(name)
     module.__file__ = str(file)
     sys.modules[name] = module
-    # modules next to the file can be imported by it
+    # the file can import modules that are next to it
     sys.path.insert(0, str(file.parent))
     try:
-        # compiled here because the import cache of Python compares whole seconds only
+        # compiled here, because Python's import cache compares modification times only
+        # in whole seconds
         exec(compile(content, str(file), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         del sys.modules[name]

@@ -25,7 +25,7 @@ from ...parameters import VectorLike
 from ._published_fit import PublishedFit
 
 
-# upper limit of a residual in standard errors, used if it cannot be computed
+# residual (in standard errors) that is used if a quantity cannot be computed
 _HOPELESS = 1e8
 # relative change below which the iteration ends
 _XTOL = 1e-10
@@ -245,7 +245,9 @@ def _least_squares(describe, values, errors, weights, unknowns, max_steps):
 
 
 def _described(program, cost, progress):
-    """Return the quantities and their derivatives; the last evaluation is cached."""
+    """Return a function that evaluates the quantities and their derivatives and caches
+    its last result.
+    """
     counted = itertools.count(1)
 
     @functools.lru_cache(maxsize=1)
@@ -256,7 +258,7 @@ def _described(program, cost, progress):
             progress(next(counted), cost(unknowns, value))
         return value, slope
 
-    # value and derivative are requested one after the other at the same point
+    # the optimizer requests value and derivative at the same point, one after the other
     return lambda unknowns: cached(np.asarray(unknowns, dtype=float).tobytes())
 
 

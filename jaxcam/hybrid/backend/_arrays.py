@@ -19,14 +19,14 @@ from ._lookup import fill_of, looked_up_in_memory
 from ._writer import Lacking, Writer
 
 
-# operations that only move elements, by known indices
+# operations that only move elements if their indices are known
 MOVES = frozenset(
     """
     broadcast_in_dim concatenate copy dynamic_slice dynamic_update_slice expand_dims
     gather pad rev reshape scatter slice split squeeze stack tile transpose
     """.split()
 )
-# maximum number of values that a scatter may combine: the bits of a float
+# maximum number of values that a scatter may combine: one for each bit of a float
 _BITS = 52
 # maximum size of a table whose elements are selected by comparison with an unknown
 # index; longer ones are read from memory
@@ -80,7 +80,7 @@ def moved(equation, inputs) -> list[np.ndarray]:
 
 
 def _indices_of(name: str, count: int) -> tuple[int, ...]:
-    """Return which operands are indices."""
+    """Return which operands of an operation are indices."""
     if name == "gather" or name.startswith("scatter"):
         return (1,)
     if name == "dynamic_slice":
@@ -133,7 +133,7 @@ def has_known_indices(equation, inputs) -> bool:
 
 @no_type_check
 def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
-    """Emit a rearrangement by unknown indices, compared with all possible ones."""
+    """Emit a rearrangement by unknown indices, by comparisons or from memory."""
     name = equation.primitive.name
     if name in ("dynamic_slice", "dynamic_update_slice"):
         return _sliced(w, equation, inputs, dtypes)
@@ -146,7 +146,7 @@ def looked_up(w: Writer, equation, inputs, dtypes) -> list[np.ndarray]:
         return [_each_looked_up(w, equation, inputs, dtypes)]
     shape, sizes = inputs[0].shape, equation.params["slice_sizes"]
     room = [shape[d] - sizes[d] + 1 for d in numbers.start_index_map]
-    # outside the array, use the fill value or the nearest element
+    # outside the array, a gather returns the fill value or the nearest element
     mode = str(equation.params["mode"]).upper()
     clips = "FILL" not in mode
     return _by_comparison(w, equation, inputs, (1,), room, clips, dtypes)
@@ -240,7 +240,7 @@ def value_of(w: Writer, element, dtype):
 
 
 def reduced(operation: Callable, elements: np.ndarray, axes) -> np.ndarray:
-    """Reduce the elements along some axes."""
+    """Return the reduction of the elements along the given axes."""
     moved_axes = np.moveaxis(elements, axes, range(len(axes)))
     shape = moved_axes.shape[len(axes) :]
     columns = moved_axes.reshape((-1, *shape))
@@ -254,7 +254,7 @@ def reduced(operation: Callable, elements: np.ndarray, axes) -> np.ndarray:
 
 
 def running(operation: Callable, elements: np.ndarray, axis: int, reverse: bool):
-    """Compute a cumulative reduction along an axis, forwards or backwards."""
+    """Return the cumulative reduction along an axis, forwards or backwards."""
     out = np.moveaxis(elements.copy(), axis, 0)
     out = out[::-1] if reverse else out
     for k in range(1, out.shape[0]):
@@ -265,7 +265,7 @@ def running(operation: Callable, elements: np.ndarray, axis: int, reverse: bool)
 
 
 def product(add: Callable, multiply: Callable, a, b, numbers) -> np.ndarray:
-    """Multiply matrices, or batches of them."""
+    """Return the product of two arrays, possibly in batches, as `dot_general` does."""
     (left, right), (batch_left, batch_right) = numbers
     rest_a = [d for d in range(a.ndim) if d not in (*left, *batch_left)]
     rest_b = [d for d in range(b.ndim) if d not in (*right, *batch_right)]
@@ -297,7 +297,7 @@ def extreme_place(w: Writer, name: str, elements, axes, dtype, index_dtype):
             one = value_of(w, columns[(k, *index)], dtype)
             better = elementwise(w, sign, {}, dtype, [one, best])
             if np.issubdtype(dtype, np.floating):
-                # the first NaN counts
+                # the first NaN determines the position
                 odd = elementwise(w, "ne", {}, dtype, [one, one])
                 fine = elementwise(w, "eq", {}, dtype, [best, best])
                 better = elementwise(w, "or", {}, np.dtype(bool), [better, odd])
@@ -309,14 +309,14 @@ def extreme_place(w: Writer, name: str, elements, axes, dtype, index_dtype):
 
 
 def element(value) -> np.ndarray:
-    """Return a value as an array without dimensions."""
+    """Return an array of zero dimensions that contains the value."""
     out = np.empty((), dtype=object)
     out[()] = value
     return out
 
 
 def elements(values) -> np.ndarray:
-    """Return values as a vector."""
+    """Return a one-dimensional array of the values."""
     out = np.empty(len(values), dtype=object)
     out[:] = values
     return out

@@ -19,7 +19,8 @@ from ._machine import Compiled, compiled
 from ._writer import compiled_or_lacking, Lacking
 
 
-# rounds per call; between calls, a run can be interrupted and its progress shown
+# maximum number of rounds of attempts per call; between calls, a run can be interrupted
+# and its progress reported
 _PATIENCE = 200_000
 _POINTERS = (ctypes.c_void_p,) * 8
 _ARGUMENTS = (
@@ -68,7 +69,7 @@ def key_of(
 
 
 def traced(key: Key) -> Program:
-    """Trace one attempt as a program."""
+    """Return one attempted step as a traced program."""
     static = jax.tree.unflatten(key.structure, [leaf for _, leaf in key.static])
 
     def attempt(own, shared, *scalars):
@@ -102,8 +103,8 @@ def traced(key: Key) -> Program:
 
 
 class Sizes(NamedTuple):
-    """The number of values in a state, in the data of one element, and in a row of the
-    log.
+    """The numbers of values in the state of a batch element, in its own data, and in a
+    row of the log.
     """
 
     state: int
@@ -114,7 +115,7 @@ class Sizes(NamedTuple):
 
 
 def sizes_of(program: Program) -> Sizes:
-    """Return the sizes of a program."""
+    """Return the `Sizes` of a program."""
     return Sizes(len(program.dtypes), program.own, program.row, program.steps)
 
 
@@ -123,7 +124,7 @@ class Attempts:
 
     def __init__(self, key: Key):
         program = traced(key)
-        # only its sizes are kept, because the program itself takes megabytes
+        # only the sizes of the program are kept, because the program takes megabytes
         self.sizes = sizes_of(program)
         self.width = key.width
         text = str(module_of(program, key.width))
@@ -181,7 +182,7 @@ def attempts_of(key: Key) -> Attempts:
 
 
 def say_lacking(lacking: Lacking, demanded: bool) -> None:
-    """Report once that a system runs with XLA.
+    """Report once that a system runs with XLA, because LLVM cannot compile it.
 
     **Raises:** `ValueError` instead if LLVM is `demanded`.
     """

@@ -18,7 +18,7 @@ from ._writer import INT64, kind_of, Lacking, Writer
 
 # maximum number of operations of an unrolled loop
 _UNROLLED = 6000
-# maximum number of values of a loop on the stack
+# maximum number of values that a table of a loop may store on the stack
 _KEPT = 16384
 
 
@@ -136,7 +136,7 @@ def while_loop(w: Writer, program: Callable, equation, inputs):
 
 @no_type_check
 def scan(w: Writer, program: Callable, size: Callable, equation, inputs):
-    """Emit a loop of a known number of rounds, unrolled if the body is short."""
+    """Emit a loop of a known number of rounds, unrolled if it is short."""
     params = equation.params
     number, length = params["num_carry"], params["length"]
     fixed, rest = inputs[: params["num_consts"]], inputs[params["num_consts"] :]
@@ -213,7 +213,7 @@ class _Table:
         self.shape = array.shape if shape is None else shape
         self.size = int(np.prod(self.shape[1:]))
         kind = kind_of(dtype)
-        # each flag takes a byte
+        # a flag is stored as a byte
         self.kind = w.vector(ir.IntType(8) if kind == ir.IntType(1) else kind)
         if self.shape[0] * self.size > _KEPT:
             raise Lacking(f"scan over {self.shape[0]} rows of {self.size}")

@@ -14,9 +14,10 @@ from ._ptx import needed, ptx_of
 from ._writer import compiled_or_lacking, Lacking
 
 
-# threads of a block; few, because each thread needs most of the registers it can have
+# number of threads in a block; small, because each thread needs many registers
 _BLOCK = 64
-# rounds per launch; between launches, Python can be interrupted
+# maximum number of rounds of attempts per launch; between launches, Python can be
+# interrupted
 _PATIENCE = 20_000
 
 
@@ -56,7 +57,7 @@ class CudaAttempts:
         The arguments are those of `Attempts.run`.
         """
         cupy = _cupy()
-        # each Python thread must select the GPU before it asks about the kernel
+        # each Python thread must select the GPU before it queries the kernel
         cupy.cuda.Device().use()
         states, log = cupy.asarray(lanes), cupy.asarray(table)
         blocks = min(-(-len(lanes) // _BLOCK), self._resident())

@@ -30,7 +30,7 @@ _SUMS = {"add": "add", "add_any": "add", "sub": "sub", "mul": "mul"}
 
 @no_type_check
 def elementwise(w: Writer, name: str, params, dtype, x):
-    """Return the result of an operation.
+    """Emit an elementwise operation, and return its result.
 
     **Raises:** `Lacking`, with the name of the operation.
     """
@@ -138,7 +138,7 @@ def _comparison(w: Writer, sign: str, dtype, x):
 
 @no_type_check
 def _ordered(w: Writer, sign: str, dtype, x):
-    """Compare in a total order of floats, which includes NaN."""
+    """Return a comparison in the total order of floats, which includes NaN."""
     if not is_float(dtype):
         return _comparison(w, sign, dtype, x)
     b, size = w.builder, kind_of(dtype)
@@ -225,8 +225,9 @@ def _of_integers(w: Writer, name: str, dtype, x):
 
 @no_type_check
 def _quotient(w: Writer, name: str, signed: bool, x):
-    """Divide integers. Division by zero gives the quotient -1, and the dividend as
-    remainder; the smallest number divided by -1 gives itself, and the remainder 0.
+    """Return the quotient or the remainder of integers. Division by zero gives the
+    quotient -1, and the dividend as the remainder; the smallest number divided by -1
+    gives itself and the remainder 0.
     """
     b, (over, under) = w.builder, x
     zero, one, least = w.like(under, 0), w.like(under, 1), w.like(under, -1)

@@ -30,7 +30,7 @@ _NOTHING = frozenset({"stop_gradient", "optimization_barrier"})
 
 
 class Emitter:
-    """Emits programs; their values are elements of numpy arrays."""
+    """Emits JAX programs; each value is a numpy array of numbers or LLVM values."""
 
     def __init__(self, writer: Writer):
         self.w = writer
@@ -76,7 +76,7 @@ class Emitter:
         if name in MOVES and has_known_indices(equation, inputs):
             return moved(equation, inputs)
         if inputs and all(map(known, inputs)):
-            # an empty array has no element that tells its type
+            # the type of an empty array cannot be found from its elements
             arrays = [
                 join_known(i) if i.size else np.empty(i.shape, d)
                 for i, d in zip(inputs, dtypes, strict=True)
@@ -92,7 +92,7 @@ class Emitter:
                 for i in inputs
             ]
             out = np.empty(output.shape, dtype=object)
-            # type of the operands, not of the selector
+            # the type of an operation is that of its operands, not of a selector
             dtype = dtypes[1] if name == "select_n" else dtypes[0]
             out.ravel()[:] = [
                 self._scalar(name, params, dtype, dtypes, scalars)

@@ -1,4 +1,4 @@
-"""The loop around an attempt: a vector of batch elements, refilled one by one.
+"""The loop around an attempt, for a vector of batch elements replaced one by one.
 
 The values of the active batch elements are in slots, with one row per value and one
 column per slot. Each round loads them, performs one attempt and stores the results.
@@ -24,8 +24,8 @@ from ._writer import DOUBLE, INT64, Place, Writer
 
 # name of the function in each module
 ENTRY = "run"
-# numbers that the calls (or threads) share: index of the next batch element, rounds so
-# far, and calls that ended before their batch elements
+# numbers that the calls (or threads) share: index of the next batch element, number of
+# rounds so far, and number of calls that returned before their batch elements had ended
 QUEUE, ROUNDS, UNFINISHED = COUNTERS = range(3)
 _POINTER = DOUBLE.as_pointer()
 _COUNTS = INT64.as_pointer()
@@ -172,7 +172,7 @@ class _Kernel:
         self.b.store(value, self.b.gep(pointer, [place]))
 
     def _count(self, which: int, number):
-        """Add to a counter, and return its previous value."""
+        """Emit code that adds to a counter, and return the previous value."""
         place = self.b.gep(self.a.counters, [self._int(which)])
         return self.b.atomic_rmw("add", place, number, "monotonic")
 
@@ -221,8 +221,8 @@ class _Kernel:
             self._store(self._load(source, place(i)), target, to(i))
 
     def _refill(self) -> Any:
-        """Store ended batch elements and load waiting ones; return the occupied slots
-        as bits.
+        """Emit code that stores ended batch elements and loads waiting ones; return the
+        occupied slots as bits.
         """
         b, a = self.b, self.a
         with self._each(self._int(self.w.width)) as k:
@@ -255,7 +255,7 @@ class _Kernel:
         return self.w.vector(INT64).as_pointer()
 
     def _take(self, lane, mine, k) -> None:
-        """Load a waiting batch element into a slot."""
+        """Emit code that loads a waiting batch element into a slot."""
         b, a = self.b, self.a
         self._store(lane, a.work, mine)
         states = b.mul(lane, self._int(self.states))
@@ -329,7 +329,7 @@ class _Kernel:
         return self._bits(here)
 
     def _log(self, row, place) -> None:
-        """Copy rows to the log."""
+        """Emit code that copies the rows of all slots to their places in the log."""
         b, a, p = self.b, self.a, self.p
         places = self.w.memory(self.w.vector(DOUBLE), 1)
         b.store(place, places)

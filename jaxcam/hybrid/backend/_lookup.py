@@ -12,7 +12,7 @@ from ._elementwise import converted
 from ._writer import INT32, INT64, kind_of, Lacking, Place, Writer
 
 
-# maximum number of computed values that lookups store on the stack, in all
+# maximum number of computed values that all lookups together store on the stack
 _KEPT = 4096
 
 
@@ -61,10 +61,10 @@ def looked_up_in_memory(w: Writer, equation, array, starts, dtypes) -> np.ndarra
 
 class _Slicing(NamedTuple):
     sizes: tuple[int, ...]
-    # indexed dimensions, and those that the result lacks
+    # dimensions that are indexed, and dimensions that the result does not have
     axes: tuple[int, ...]
     collapsed: tuple[int, ...]
-    # value outside the array; `None` if the nearest slice is used instead
+    # value returned outside the array; `None` if the nearest slice is returned instead
     fill: Any
 
 
@@ -82,7 +82,7 @@ def _slicing(equation, shape) -> _Slicing:
 
 
 def fill_of(equation):
-    """Return the value that a gather gives outside the array."""
+    """Return the value that a gather returns outside the array."""
     dtype, value = equation.outvars[0].aval.dtype, equation.params.get("fill_value")
     if value is None:
         inexact = np.issubdtype(dtype, np.inexact)
@@ -92,8 +92,8 @@ def fill_of(equation):
 
 @no_type_check
 def _place_of(w: Writer, elements, dtype) -> Place:
-    """Return where the elements are in memory; computed elements are stored there
-    first.
+    """Return where the elements are in memory; computed elements that are not there
+    yet are stored first.
     """
     if all(map(is_known, elements)):
         return Place(_constant(w, elements, dtype), 0)

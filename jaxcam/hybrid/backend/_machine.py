@@ -21,7 +21,7 @@ _LEVEL = 2
 
 
 class Compiled:
-    """A compiled function; it keeps its code alive."""
+    """A compiled function, which keeps its machine code in memory."""
 
     def __init__(self, tracker, name: str, result, arguments):
         self._tracker = tracker
@@ -52,7 +52,7 @@ def vector_width() -> int:
 
 
 def _machine():
-    # the small code model: constants are addressed relative to the code
+    # in the small code model, constants are addressed relative to the code
     return _target().create_target_machine(
         cpu=llvm.get_host_cpu_name(),
         features=_features(),

@@ -60,7 +60,7 @@ def _module_of(traced: _Traced, width: int) -> ir.Module:
     first.add_incoming(number(0), before)
 
     def column(array, k):
-        """Return `width` values of row k of an array."""
+        """Return the address of the next `width` values of row k of an array."""
         place = b.gep(array, [b.add(b.mul(number(k), count), first)])
         return b.bitcast(place, writer.vector(DOUBLE).as_pointer())
 
@@ -85,7 +85,7 @@ def _module_of(traced: _Traced, width: int) -> ir.Module:
 
 
 class Mapped:
-    """Compile `function(shared, own)`, which returns a list of scalars, for many `own`.
+    """A function of `(shared, own)` that returns scalars, compiled for many `own`.
 
     **Arguments:** a function of two arrays of 64-bit floats, and their sizes.
 

@@ -28,7 +28,7 @@ class _Compiled(NamedTuple):
 
 
 class Rowwise:
-    """A function of shared values and of one row, for rows that are not traced.
+    """A function of shared values and of one row, applied to rows that are not traced.
 
     It is compiled once for each kind of arguments: by LLVM, in a small fraction of the
     time that XLA takes; or by XLA if LLVM is not wanted or lacks an operation.

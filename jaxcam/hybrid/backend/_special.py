@@ -42,7 +42,7 @@ LIBRARY = frozenset(
 
 
 class Arithmetic:
-    """Short names for arithmetic on values of one shape and Python numbers."""
+    """Short names for arithmetic on LLVM values of one shape and on Python numbers."""
 
     def __init__(self, writer: Writer):
         self.w = writer
@@ -127,9 +127,9 @@ def _scaled_exp(a: Arithmetic, high, low, turns):
     c = a.sub(r, a.mul(z, a.horner(_EXP, z)))
     bend = a.div(a.mul(r, c), a.sub(2.0, c))
     y = a.sub(1.0, a.sub(a.sub(low, bend), high))
-    # in two factors, each representable as a float
+    # multiply by 2^turns in two factors, each of which is representable as a float
     whole = a.b.fptosi(turns, a.w.with_kind(turns, INT64))
-    # for NaN the number of turns is arbitrary
+    # for NaN, the converted number of turns would be arbitrary
     whole = a.b.select(a.is_nan(turns), a.w.like(whole, 0), whole)
     half = a.b.ashr(whole, a.w.like(whole, 1))
     for part in (half, a.b.sub(whole, half)):
@@ -159,7 +159,7 @@ def log(writer: Writer, x):
     made = a.sub(a.mul(k, _LN2_HIGH), a.sub(a.sub(half, low), f))
     made = a.choose(a.equal(x, float("inf")), x, made)
     made = a.choose(a.equal(x, 0.0), float("-inf"), made)
-    # negative or NaN
+    # the logarithm of a negative number, or of NaN, is NaN
     fine = a.b.fcmp_ordered(">=", x, writer.like(x, 0.0))
     return a.choose(fine, made, float("nan"))
 
@@ -183,7 +183,8 @@ def _write_remainder(writer: Writer, name: str, kind):
     x, y = function.args
     size, step = w.call("llvm.fabs", [x]), w.call("llvm.fabs", [y])
     ratio = w.call("llvm.trunc", [builder.fdiv(size, step)])
-    # product and difference are exact: up to 2^53 steps, a float holds the remainder
+    # the product and the difference are exact, because a float can represent the
+    # remainder for up to 2^53 steps
     rest = w.call("llvm.fma", [builder.fneg(ratio), step, size])
     rest = a.choose(a.less(rest, 0.0), builder.fadd(rest, step), rest)
     rest = a.choose(a.less(size, step), size, rest)

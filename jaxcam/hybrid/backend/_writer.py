@@ -29,7 +29,7 @@ _KINDS = {
 
 
 class Lacking(Exception):
-    """Raised for an operation that this backend does not have, with its name."""
+    """Raised, with the name of the operation, if the backend lacks an operation."""
 
 
 @functools.cache
@@ -41,7 +41,7 @@ def kind_of(dtype) -> Any:
 
 
 def compiled_or_lacking(cache: Cache, key, make: Callable):
-    """Return what `make` compiles for a key; it is compiled only once.
+    """Return the result of `make`, which is called only once for each key.
 
     **Raises:** `Lacking`, even if tracing or compiling fails for another reason: XLA
     then runs the program, or reports the error in it.
@@ -92,7 +92,7 @@ class Writer:
         self.places: dict[int, Place] = {}
         # number of values that lookups have stored on the stack
         self.stored = 0
-        # tables of known numbers
+        # tables of known numbers, keyed by their type and content
         self.constants: dict[tuple[str, bytes], ir.GlobalVariable] = {}
 
     def remember(self, values, first: Place) -> None:
@@ -113,7 +113,7 @@ class Writer:
         return ir.Constant(kind, float(np.dtype(dtype).type(value)))
 
     def spread(self, value):
-        """Return a value as a vector."""
+        """Return a vector that contains the value for every batch element."""
         kind = value.type
         if self.width == 1 or isinstance(kind, ir.VectorType):
             return value
@@ -158,7 +158,7 @@ class Writer:
         return ir.Function(self.module, kind, name) if known is None else known
 
     def any(self, flags):
-        """Return whether a flag is set for any batch element; a scalar."""
+        """Return, as a scalar, whether a flag is set for any batch element."""
         if not isinstance(flags.type, ir.VectorType):
             return flags
         bits = ir.IntType(flags.type.count)
@@ -166,7 +166,7 @@ class Writer:
         return self.builder.icmp_unsigned("!=", set_bits, ir.Constant(bits, 0))
 
     def both(self, a, b):
-        """Return where both flags are set; `None` stands for all batch elements."""
+        """Return a flag that is set where both are; `None` is set for all elements."""
         if a is None or b is None:
             return b if a is None else a
         return self.builder.and_(*self.alike([a, b]))

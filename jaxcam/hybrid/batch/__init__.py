@@ -1,4 +1,4 @@
-"""Simulate many trajectories, of which a smaller number run at a time."""
+"""Simulate many trajectories, of which a smaller number run at the same time."""
 
 from ._layout import Horizon as Horizon, Lanes as Lanes, split_lanes as split_lanes
 from ._refilled_lanes import Chunking as Chunking, run_refilled as run_refilled

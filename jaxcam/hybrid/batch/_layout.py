@@ -1,8 +1,8 @@
 """Store many batch elements as one matrix, and compile the loop that works on it.
 
-Each chunk is one dispatch with few arrays. Passing a whole system and all leaves of a
-batch element instead would make a dispatch four times as slow: as slow as the
-computation of a chunk for 64 elements.
+Each chunk is one dispatch with few arrays. If a whole system and all leaves of a batch
+element were passed instead, a dispatch would take four times as long, which is as long
+as the computation of a chunk for 64 elements.
 """
 
 import functools
@@ -20,18 +20,19 @@ from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
 from ..lowering import one_kernel, Packed, without_library
 
 
-# ratio of starts computed at once to batch elements that run at once
+# ratio of the number of starts computed at once to that of batch elements that run at
+# once
 _AT_ONCE = 16
 
 
 class LaneLayout(NamedTuple):
-    """The matrix row that holds each number of a batch element, and its type."""
+    """The matrix row of each number of a batch element, and the type of the number."""
 
     rows: Any
     dtypes: tuple
 
     def unpacked(self, numbers):
-        """Return the batch element with these numbers."""
+        """Return the batch element that consists of these numbers."""
         leaves = [
             number.astype(dtype)
             for number, dtype in zip(numbers, self.dtypes, strict=True)
@@ -71,7 +72,7 @@ class Lanes(NamedTuple):
     """Initial states, `(elements, n)`."""
 
     def some(self, which: slice) -> "Lanes":
-        """Return some of the batch elements."""
+        """Return the batch elements that a slice selects."""
         values = None if self.values is None else self.values[which]
         return self._replace(values=values, states=self.states[which])
 
@@ -109,7 +110,7 @@ def start_lanes(
 ) -> LaneStart:
     """Return the start of the batch elements, of which `width` will run at a time.
 
-    If it is given, `first_of` computes the first states, with derivatives.
+    If `first_of` is given, it computes the first states together with derivatives.
     """
     pieces, count = [], len(lanes.states)
     whole = jnp.asarray(float(horizon.number))
@@ -140,10 +141,11 @@ def start_lanes(
 def compiled_chunk(
     start: LaneStart, own: Packed, shared: Packed, rows: int, row: Callable
 ):
-    """Return the compiled loop.
+    """Return the compiled loop that makes the attempts of one chunk.
 
-    It is a function of own parts, of shared parts (each as numbers and separate leaves)
-    and of the numbers of the batch elements; it returns their new numbers and the log.
+    It is a function of the parts that differ between batch elements, of the shared
+    parts (each as numbers and separate leaves) and of the numbers of the batch
+    elements; it returns the new numbers of the batch elements and the log.
     A call makes `rows` attempts in each slot, rounded up to whole blocks. `row` is that
     of a `Table`. The log has one array `(rows, slots)` for each number in a row; the
     first array contains the places plus one, and zero where no place is written.
@@ -208,7 +210,9 @@ def split_lanes(system, where, values):
 
 @eqx.filter_jit
 def _ready(batched, shared, period, t0, turns, settings, differentiable: bool):
-    """Return system and plan, split into own and shared parts."""
+    """Return the system and the plan, split into the parts that differ between batch
+    elements and the shared parts.
+    """
 
     def prepared(batched):
         system = eqx.combine(batched, shared).prepared()
@@ -237,7 +241,7 @@ def _ready(batched, shared, period, t0, turns, settings, differentiable: bool):
 
 
 def _first_of(shared, row) -> LoopState:
-    """Return the first state of one batch element."""
+    """Return the first loop state of one batch element."""
     (t0, rest), (own, state) = shared, row
     system, plan = eqx.combine(own, rest)
     x = tuple(state[i] for i in range(state.shape[0]))

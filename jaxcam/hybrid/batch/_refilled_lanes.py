@@ -1,4 +1,4 @@
-"""Run many batch elements in fewer positions, which are refilled when one ends."""
+"""Run many batch elements in fewer positions, each refilled when its element ends."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -38,7 +38,7 @@ class Chunking(NamedTuple):
 def run_refilled(
     lanes: Lanes, horizon: Horizon, settings, chunking: Chunking, table: Table
 ):
-    """Run some batch elements; each one that ends is replaced by the next.
+    """Run the batch elements; each one that ends is replaced by the next.
 
     Elements are independent, so their order and grouping do not change any result. The
     logs of all batch elements are stored in the `table`.
@@ -68,7 +68,7 @@ def run_compiled(
 ):
     """Run the loop as LLVM code, which replaces ended batch elements itself.
 
-    `step` takes one attempted step; `between` is called now and then.
+    `step` takes one attempted step; `between` is called at intervals.
 
     **Raises:** `Lacking` if the backend lacks an operation.
     """

@@ -1,4 +1,4 @@
-"""A table that stores each row of a log at a place of its batch element."""
+"""A table that stores the log rows of each batch element at numbered places."""
 
 from collections.abc import Callable
 

@@ -14,15 +14,15 @@ from ._table import Table
 
 
 # a tangent vector that shrinks to this fraction in one attempt has vanished: what is
-# left of it is rounding
+# left of it is a rounding error
 _GONE = 1e-14
 # number of batch elements whose starts are computed at a time
 _WIDTH = 128
 
 
 class Varying(NamedTuple):
-    """The parts of a loop state that have derivatives, at a given time; all others have
-    none.
+    """The parts of a loop state that have derivatives at a fixed time; all other parts
+    have none.
     """
 
     x: tuple
@@ -31,11 +31,11 @@ class Varying(NamedTuple):
 
     @staticmethod
     def of(state: LoopState) -> "Varying":
-        """Return these parts of a state."""
+        """Return the parts of a loop state that have derivatives."""
         return Varying(state.x, state.jets, state.step)
 
     def put(self, state: LoopState) -> LoopState:
-        """Return a state with these parts."""
+        """Return a loop state with its parts replaced by these."""
         return state._replace(**self._asdict())
 
 
@@ -118,13 +118,13 @@ def _at_one_time(
         )
         for d, jet in zip(tangent.jets, state.jets, strict=True)
     ]
-    # the next step, if it ends at an event, is longer by the delay
+    # the next step is longer by the delay if it ends at an event
     fixed = state.completing | state.locating
     step = tangent.step + jnp.where(fixed, delay, 0.0)
     moved = Varying(tuple(x), tuple(jets), step)
     if not functions.planar:
         return moved
-    # time alone determines the state in contact
+    # in contact, time alone determines the state
     (held,) = state.contact
     return jax.tree.map(lambda part: jnp.where(held, 0.0, part), moved)
 
@@ -134,7 +134,7 @@ def _orthonormal(columns: list[Varying]):
     done, lengths = [], []
     for column in columns:
         before = _product(column, column)
-        # two passes are enough
+        # two passes make the columns orthogonal to within rounding
         for _ in range(2):
             for earlier in done:
                 share = _product(earlier, column)
@@ -153,7 +153,7 @@ def _product(a: Varying, b: Varying):
 
 
 def _first_of(shared, row) -> TangentState:
-    """Return the first state and frame of one batch element."""
+    """Return the first loop state and the first frame of one batch element."""
     (t0, rest), (own, state) = shared, row
     system, plan = eqx.combine(own, rest)
     functions = Functions(system, state.shape[0], plan.plain, shared=True)
@@ -180,10 +180,10 @@ _FIRST = Rowwise(_first_of)
 def run_tangents(
     lanes: Lanes, horizon: Horizon, settings, max_steps: int, table: Table, between=None
 ):
-    """Run some batch elements with a frame of tangent vectors each.
+    """Run the batch elements, each with a frame of tangent vectors.
 
     The row of the `table` is a function of the record of an attempt and of the
-    `TangentState` after it. `between` is called now and then.
+    `TangentState` after it. `between` is called at intervals.
 
     Returns:
         Impacts, attempts and result codes, each `(elements,)`.

@@ -1,4 +1,4 @@
-"""Samples of many batch elements once per period, and the events between samples."""
+"""Samples of batch elements once per period, and counts of events between samples."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -8,10 +8,10 @@ from ._table import Table
 
 
 class TurnSamples:
-    """Samples of a group, and the events between them."""
+    """Samples of a group of batch elements, and counts of events between samples."""
 
     def __init__(self, lanes: int, turns: int, skip: int, n: int):
-        # the first place is for the skipped periods
+        # the first place is the sample at the end of the skipped periods
         self.table = Table(_row, lanes, turns - skip + 1, 2 + n, skip)
 
     @property
@@ -19,8 +19,8 @@ class TurnSamples:
         return self.table.numbers[:, 1:, 2:]
 
     def counts(self):
-        """Return the numbers of impacts and completed chatter sequences in each period;
-        0 where an element failed.
+        """Return the numbers of impacts and of completed chatter sequences in each
+        sampled period; 0 where an element failed.
         """
         so_far = np.nan_to_num(self.table.numbers[..., :2]).astype(int)
         each = np.maximum(np.diff(so_far, axis=1), 0)

@@ -25,10 +25,11 @@ from ._select import any_of, select
 
 # consecutive attempts without progress in time after which a run gives up
 _PATIENCE = 80
-# weight of an impact that loses energy among these attempts: bodies come to rest after
-# many such impacts
+# weight of an impact that loses energy when these attempts are counted: small, because
+# bodies come to rest only after many such impacts
 _IMPACT_WEIGHT = 1 / 16
-# impacts on two constraints within this fraction of the longest allowed step accumulate
+# if a run gives up, impacts on two constraints within this fraction of the longest
+# allowed step are reported as accumulating
 _TOGETHER = 1e-3
 # minimum number of steps per forcing period
 _PARTS = 4
@@ -46,7 +47,7 @@ class Plan(NamedTuple):
     # limits the step if the error estimate is uninformative: in contact, and at rest
     # without a force
     longest_step: Any
-    # the same limit without a period
+    # the same limit, but finite if there is neither a period nor a maximum step
     unseen_step: Any
     # inverse of the length of the run
     per_run: Any
@@ -149,7 +150,8 @@ class Attempt(NamedTuple):
     # has reached
     strikes: Any
     stuck: Any
-    # whether friction causes a contact force not to be unique at the end of the step
+    # whether, because of friction, a contact force does not exist or is not unique at
+    # the end of the step
     jams: Any
     # as in `LoopState`
     stale: tuple
@@ -235,7 +237,7 @@ def _longest(plan, carried, attempt):
         h < 0.999 * carried.longest, jnp.maximum(carried.longest, grown), grown
     )
     grown = jnp.where(any_of(carried.contact) & (effort == 0.0), carried.longest, grown)
-    # nor does an error due to rounding
+    # an error that is only rounding contains no information about it either
     blind = says_nothing(effort, plan.tolerance)
     most = jnp.maximum(carried.longest, plan.unseen_step)
     grown = jnp.where(blind, jnp.minimum(grown, most), grown)
@@ -248,7 +250,7 @@ def _next_length(plan, carried, attempt, longest):
     """Return the step to the next contact or release, or the longest allowed step."""
     ahead = jnp.minimum(longest, 6.0 * carried.ramp)
     good, h = attempt.good, attempt.length
-    # the step that completes a chatter did not follow the motion
+    # the step that completes a chatter does not follow the motion: its length is unused
     whole = (h > 0) & ~carried.completing
     inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
     flags = closed(attempt.mode, len(carried.held), len(carried.jets))
@@ -270,12 +272,13 @@ def _next_length(plan, carried, attempt, longest):
 
 
 def _scale(carried, attempt) -> tuple:
-    """Return the largest gap of each constraint and distance of each surface so far."""
+    """Return the largest gaps, and the largest distances from surfaces, so far."""
     found = []
     for k, (s, jet) in enumerate(zip(carried.scale, attempt.jets, strict=True)):
         grows = attempt.good
         if carried.stale and k >= len(carried.held):
-            # while the motion slides, the distance is that from the end of sliding
+            # while the motion slides, the jet contains the distance from the end of
+            # sliding instead
             slides = attempt.mode[len(carried.jets) + k - len(carried.held)]
             grows = grows & ~slides
         larger = jnp.maximum(s, jnp.abs(jet.gap))
@@ -284,7 +287,9 @@ def _scale(carried, attempt) -> tuple:
 
 
 def _struck(carried, attempt):
-    """Return the last impact time of each constraint, and a count of hidden flights."""
+    """Return the time of the last impact on each constraint, and the number of
+    consecutive impacts whose flights are hidden by rounding.
+    """
     if not carried.struck:
         return carried.struck, carried.crowded
     struck = tuple(
@@ -297,7 +302,7 @@ def _struck(carried, attempt):
 
 
 def _weight(attempt):
-    """Return for how many attempts without progress an attempt counts."""
+    """Return the number of attempts without progress that this attempt counts as."""
     if len(attempt.held) < 2:
         return 1.0
     return jnp.where(attempt.good & attempt.loses, _IMPACT_WEIGHT, 1.0)

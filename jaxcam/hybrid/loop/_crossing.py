@@ -12,14 +12,14 @@ from ._select import any_of, select
 from ._step import Step
 
 
-# distance just after a crossing, relative to the largest so far, up to which it is the
-# error of the location
+# just after a crossing, a distance below this fraction of the largest one so far is an
+# error of event location
 _NEAR = 1e-9
 # the scale of the distance from a surface is at least the distance that the motion
 # covers in this fraction of the longest step
 _SHORT = 1e-3
-# acceleration off a constraint, relative to that before the motion slid, up to which it
-# is rounding
+# an acceleration off a constraint below this fraction of the acceleration before the
+# motion slid is a rounding error
 _ZERO = 1e-11
 
 
@@ -41,13 +41,14 @@ class Passed(NamedTuple):
     slides: list
     # whether the motion can neither leave a surface nor slide along it
     stuck: Any
-    # whether completing a chatter has moved the state past a surface that stops it
+    # whether the completion of a chatter has moved the state past a surface on which
+    # the motion should have stopped
     passed_over: Any
 
 
 def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h, stops):
-    """Return the verdicts, changed so that a surface is crossed at once where a jump of
-    the state has crossed it, or where it `stops` the motion.
+    """Return the verdicts, changed so that a surface is crossed at once if a jump of
+    the state has passed it, or if sliding begins there (`stops`).
     """
     m = len(carried.held)
     for k, behind in enumerate(carried.behind, start=m):
@@ -62,8 +63,8 @@ def jumped_across(carried: LoopState, verdicts: list[StepVerdict], h, stops):
 
 
 def stopped_by_impacts(functions: Functions, carried: LoopState) -> list:
-    """Return for each surface whether the motion slides along it once contact begins,
-    because the impacts have stopped the slip.
+    """Return for each surface whether the motion slides along it as soon as contact
+    begins, because the impacts of a completed chatter have stopped the slip.
     """
     flags = [jnp.asarray(False) for _ in range(functions.k)]
     if not (functions.m and functions.slidable):
@@ -85,7 +86,9 @@ def _near(carried: LoopState, k: int):
 
 
 def _size(carried: LoopState, k: int):
-    """Return the largest distance from a surface so far, or that after a short step."""
+    """Return the largest distance from a surface so far, or the distance covered in a
+    short step if that is larger.
+    """
     row = len(carried.held) + k
     step = jnp.abs(carried.jets[row].velocity) * carried.longest
     return jnp.maximum(carried.scale[row], _SHORT * step)
@@ -131,13 +134,14 @@ def past_surfaces(
     blur,
     stops,
 ) -> Passed:
-    """Return the jets after the crossing of a surface, whose distance is then zero.
+    """Return the jets after the crossing of a surface, at zero distance from it.
 
     With a hysteresis, the distance is twice the hysteresis; after a reset, it may have
     any value. If the branch beyond the surface points back, the motion slides; the
-    field then changes by at most 1 + s times the difference of the branches. `approach`
-    is the (negative) rate at which the motion reached the surface, `blur` the rounding
-    errors of the distances, and `stops` the result of `stopped_by_impacts`.
+    field then changes by at most 1 + s times the difference of the branches, where s is
+    the result of `Functions.slack` for this surface. `approach` is the (negative) rate
+    at which the motion reached the surface, `blur` the rounding errors of the
+    distances, and `stops` the result of `stopped_by_impacts`.
     """
     jets, m = list(jets), functions.m
     slides, stuck = [], jnp.asarray(False)
@@ -147,7 +151,8 @@ def past_surfaces(
         jet, behind = jets[m + k], carried.behind[k]
         near = _near(carried, k)
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
-        # completing a chatter moves a slip that friction stops meanwhile beyond zero
+        # if friction stops the slip during a chatter, its completion moves the slip
+        # velocity beyond zero
         summed = jnp.asarray(False)
         if functions.m and k in functions.slidable:
             summed = behind & (carried.stale[0] == COMPLETED)

@@ -1,4 +1,4 @@
-"""Functions of a system, taking arrays, that only the loop needs."""
+"""Functions of a system that only the event loop needs, written for arrays."""
 
 import jax
 import jax.numpy as jnp
@@ -37,7 +37,7 @@ def free_taylor(system, t, x, contact):
 
 
 def nested_series(function, t, x, *rest) -> MotionSeries:
-    """Return the series of `motion_series` by nested derivatives of arrays."""
+    """Return the same series as `motion_series`, by nested derivatives of arrays."""
 
     def field(s, y):
         return function(s, y, *rest)[0]

@@ -22,14 +22,19 @@ from ._gap_polynomial import (
 _CLOSE = 2e-3
 # the gap must also be nearly a straight line there, so that its root is a short series
 _STRAIGHT = 4e-3
-# error of the gap polynomial, relative to the largest gap, up to which it is trusted
+# the gap polynomial is trusted if its error, relative to the largest gap, is below this
 _TRUST = 0.02
-# fraction of the longest step within which a motion off the surface does not return
+# a motion that leaves the surface from rest does not return to it within this fraction
+# of the longest step
 _SHORT = 1e-3
 
 
 class StepVerdict(NamedTuple):
-    """The outcome of a step; for one constraint, or the earliest of several."""
+    """The outcome of a step for one constraint, or the earliest event of several.
+
+    `retake` tells whether the step must be repeated, with the new `length`; `lands`,
+    whether it ends in an event, which occurs `offset` (s) after its end.
+    """
 
     retake: Any
     length: Any
@@ -64,7 +69,8 @@ def judge(
     leaves = (left.gap == 0) & (left.velocity == 0) & (h <= _SHORT * longest)
     leaves = leaves & (right.velocity > 0) & (right.acceleration > 0)
     vague = (polynomial.error > _TRUST * size + rounding) & ~now & ~leaves
-    # a straight line decides, because the series can vanish far from the root
+    # a straight line decides whether the root is near, because the series may have a
+    # small value far from the root
     distance = jnp.abs(right.gap)
     speed = jnp.abs(right.velocity)
     straight = distance * jnp.abs(right.acceleration) <= _STRAIGHT * speed * speed
@@ -85,7 +91,8 @@ def judge(
 def moves_in(jet: Jet, rounding):
     """Return whether the motion enters, or is accelerated into, the constraint.
 
-    A parabola that turns back before its depth exceeds rounding only touches.
+    If the parabola through the jet turns back before the penetration exceeds the
+    rounding error, the motion only touches the constraint.
     """
     touches = (jet.acceleration > 0) & (
         2 * jet.acceleration * (jet.gap + rounding) > jet.velocity**2
@@ -95,7 +102,7 @@ def moves_in(jet: Jet, rounding):
 
 
 def earliest(verdicts: list[StepVerdict]) -> StepVerdict:
-    """Return the outcome of the step: its first event."""
+    """Return the outcome of the step for all constraints, that is, its first event."""
     best = verdicts[0]
     for k, v in enumerate(verdicts[1:], start=1):
         sooner = v.lands & (~best.lands | (v.offset < best.offset))

@@ -18,8 +18,9 @@ class Frame(NamedTuple):
 
 
 def frame_of(system, t, x):
-    """Return the directions E (unit gap) and D (unit velocity), v_x E, and C = a_x
-    D.
+    """Return, for each constraint, the direction E in which the gap changes by one, the
+    direction D in which the normal velocity v changes by one, and the products v_x E
+    and C = a_x D, where a is the normal acceleration.
     """
     slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
     curve = jax.jacfwd(lambda y: normal_acceleration(system, t, y))(x)

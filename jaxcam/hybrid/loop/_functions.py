@@ -16,7 +16,7 @@ from ._programs import programs_of
 
 
 class Functions:
-    """Functions of `(t, x)` with `x` a tuple of scalars and the parameters bound.
+    """Functions of `(t, x)`, where `x` is a tuple of scalars; the parameters are bound.
 
     The discrete `mode` is a tuple of flags: whether each of the `m` constraints is in
     contact, then whether the motion is on the negative side of each of the `k`
@@ -64,11 +64,11 @@ class Functions:
             self._memory = None
 
     def _side(self, mode) -> tuple:
-        """Return the mode as an argument, or no argument if there are no surfaces."""
+        """Return a tuple with the mode, empty if there are no surfaces."""
         return (_pack(mode),) if self.k else ()
 
     def _held(self, mode) -> tuple:
-        """Return the mode as an argument: only the contacts if there is no surface."""
+        """Return a tuple with the mode; without surfaces, it contains only contacts."""
         return (_pack(mode if self.k else mode[: self.m]),)
 
     def field(self, t, x, mode):
@@ -78,7 +78,7 @@ class Functions:
         return tuple(self._call("field", t, _pack(x), *self._held(mode)))
 
     def pairs(self, t, x, mode) -> dict[int, int]:
-        """Return which components of the state are rates of others: see
+        """Return which components of the state are rates of change of others: see
         `rates_among`.
         """
         return rates_among(x, tuple(self._call("free", t, _pack(x), *self._side(mode))))
@@ -86,8 +86,8 @@ class Functions:
     def jets(self, t, x, mode) -> list[Jet]:
         """Return one jet for each constraint, then one for each surface.
 
-        For a constraint in contact, acceleration and jerk are the multiplier q and its
-        rate: q is zero at the release.
+        For a constraint in contact, the multiplier q, which is zero at the release, and
+        its rate take the place of the acceleration and the jerk.
         """
         if self.planar:
             rows = self._call("jets", t, _pack(x), *self._held(mode))
@@ -103,7 +103,7 @@ class Functions:
             )
         for k in range(self.k):
             value, *rates = (part.surfaces[k] for part in along)
-            # the rates at a surface where a contact holds the motion are rounding
+            # if a contact holds the motion at the surface, the rates are only rounding
             still = along[0].still[k]
             found.append(Jet(value, *(jnp.where(still, 0.0, rate) for rate in rates)))
         return found
@@ -120,7 +120,7 @@ class Functions:
 
     def open_surfaces(self, t, x, mode) -> tuple[list[Jet], tuple]:
         """Return the jets of the surfaces, and the rounding errors of their distances,
-        without contacts and sliding.
+        for a motion that does not slide along them.
         """
         rows, rounding = self._call("open", t, _pack(x), *self._side(mode))
         return [Jet(*row) for row in rows], tuple(rounding)
@@ -149,8 +149,8 @@ class Functions:
 
     def settled(self, t, x, mode):
         """Return the state moved onto the surfaces on which the motion slides; and, for
-        each `slidable` surface, the change of the field beyond it, zero without
-        sliding.
+        each `slidable` surface, the change of the field from one side to the other,
+        zero if the motion does not slide there.
         """
         if not self.slidable:
             return x, []
@@ -158,12 +158,14 @@ class Functions:
         return tuple(rows[0]), [tuple(row) for row in rows[1:]]
 
     def shares(self, t, x, mode) -> tuple:
-        """Return the weights of the branches beyond the surfaces of sliding."""
+        """Return the weight of the branch beyond each surface, zero if the motion does
+        not slide on it.
+        """
         return tuple(self._call("shares", t, _pack(x), *self._side(mode)))
 
     def hold(self, t, x, mode) -> tuple[tuple, tuple]:
-        """Return how far the weights of the branches beyond the surfaces of sliding are
-        outside their limits, and these weights.
+        """Return how far the weight of the branch beyond each surface is outside its
+        limits, and this weight; see `hold_of`.
         """
         off, shares = self._call("hold", t, _pack(x), *self._side(mode))
         return tuple(off), tuple(shares)
@@ -175,11 +177,13 @@ class Functions:
         return tuple(rows[0]), tuple(rows[1])
 
     def slack(self, mode) -> tuple:
-        """Return s = (holding - 1) / 2 of each surface."""
+        """Return s = (holding - 1) / 2 of each surface; the weight of the branch beyond
+        the surface ranges from -s to 1 + s.
+        """
         return tuple(self._call("slack", *self._side(mode)))
 
     def velocity(self, t, x, mode):
-        """Return the normal velocities."""
+        """Return the normal velocity of each constraint."""
         if not self.m:
             return ()
         return tuple(self._call("velocity", t, _pack(x), *self._side(mode)))
@@ -204,14 +208,14 @@ class Functions:
         return tuple(map(tuple, self._call("lift", t, _pack(x), *self._side(mode))))
 
     def blur(self, t, x, extents, mode):
-        """Return the rounding errors of the gaps, then of the distances of surfaces,
-        for components up to `|x| + extents`.
+        """Return the rounding errors of the gaps, then of the distances from surfaces,
+        for components as large as `|x| + extents`.
         """
         reach = [jnp.abs(a) + b for a, b in zip(x, extents, strict=True)]
         return tuple(self._call("blur", t, _pack(x), _pack(reach), *self._side(mode)))
 
     def speed_blur(self, t, x, mode):
-        """Return the rounding error of the normal velocities."""
+        """Return the rounding error of each normal velocity."""
         if not self.m:
             return ()
         reach = [jnp.abs(a) for a in x]
@@ -219,7 +223,9 @@ class Functions:
         return tuple(self._call("speed_blur", t, _pack(x), _pack(reach), *side))
 
     def chatter(self, t, before, after, mode):
-        """Return C, r0 and the state P of `surface/_chatter.py` for each constraint."""
+        """Return C, r0 and the state P, defined in `surface/_chatter.py`, for each
+        constraint.
+        """
         side = self._side(mode)
         parts = self._call("chatter", t, _pack(before), _pack(after), *side)
         damping, restitution, rest = parts
@@ -235,7 +241,7 @@ class Functions:
         return tuple(state), tuple(found)
 
     def compliance(self, t, x, mode):
-        """Return the `least_compliance` of contacts; available only with friction."""
+        """Return the `least_compliance` of the contacts, which must have friction."""
         return self._call("compliance", t, _pack(x), *self._side(mode))[()]
 
     def onto(self, frame: Frame, jets, x, mode):

@@ -1,10 +1,10 @@
 """The gap within one step, as the polynomial through its jets at both ends.
 
-H, v, a and j at the two ends of a step determine a polynomial of degree seven. Its
-Bernstein coefficients bound it from below: if they are positive, the step has not
-crossed the constraint, to within the error of the polynomial. That error is estimated
-by the difference from the polynomial of degree five that ignores the jerks. All
-functions take scalars and have no branches.
+The gap g and its first three derivatives v, a and j at the two ends of a step determine
+a polynomial of degree seven. Its Bernstein coefficients bound it from below: if they
+are positive, the step has not crossed the constraint, to within the error of the
+polynomial. That error is estimated by the difference from the polynomial of degree five
+that ignores the jerks j. All functions take scalars and have no branches.
 """
 
 from typing import Any, NamedTuple
@@ -22,7 +22,9 @@ class Jet(NamedTuple):
 
 
 class Bernstein(NamedTuple):
-    """Coefficients of degree seven on the step, and their error."""
+    """Bernstein coefficients of degree seven on the step, and the error of the
+    polynomial.
+    """
 
     coefficients: tuple
     error: Any
@@ -42,7 +44,9 @@ def _scaled(jet: Jet, h) -> tuple:
 
 
 def _remainders(left: tuple, right: tuple) -> tuple:
-    """Return the errors of the left parabola at the right end, as for `_scaled`."""
+    """Return the errors of the left parabola at the right end: coefficients of orders
+    zero to two, as in `_scaled`.
+    """
     c0, c1, c2, _ = left
     e0, e1, e2, _ = right
     return e0 - (c0 + c1 + c2), e1 - (c1 + 2 * c2), e2 - c2
@@ -66,7 +70,7 @@ def bernstein(left: Jet, right: Jet, h) -> Bernstein:
 
 def _mistrust(left: Jet, right: Jet, h):
     """Return a bound on the difference from the polynomial of degree five, which
-    ignores j.
+    ignores the jerks.
 
     The difference is s^3 (1-s)^3 (p + q (2s - 1)); its third-order coefficients at the
     ends are the differences of the jerks there.
@@ -91,7 +95,7 @@ def lowest(polynomial: Bernstein):
 
 
 def power_coefficients(left: Jet, right: Jet, h) -> tuple:
-    """Return the coefficients c0..c7 of the same polynomial in s = time/h."""
+    """Return the coefficients c0..c7 of the polynomial as powers of s = time/h."""
     at_left, at_right = _scaled(left, h), _scaled(right, h)
     r0, r1, r2 = _remainders(at_left, at_right)
     c3, e3 = at_left[3], at_right[3]

@@ -12,9 +12,9 @@ from ._select import any_of, select
 class Hits(NamedTuple):
     """The state after the impact on one constraint, or on several at once."""
 
-    # whether several constraints are hit
+    # whether several constraints are hit at the same instant
     several: Any
-    # whether the law is that of an impact on several constraints
+    # whether the impact law for several constraints applies
     joins: Any
     after: tuple
     # which constraints are hit

@@ -47,14 +47,14 @@ class Judged(NamedTuple):
 
     flown: StepVerdict
     lands: Any
-    # whether the flights allow the step
+    # whether the step may be accepted as far as the open gaps are concerned
     good: Any
     # whether the step ends behind a constraint that is hit after a release
     over: Any
-    # the step length that the errors alone would allow
+    # the step length that the error estimate alone would allow
     natural: Any
-    # for each constraint, largest gap that contact has suppressed, and resolution of a
-    # zero gap in contact
+    # for each constraint, the largest displacement that contact has suppressed, and the
+    # resolution of a zero gap in contact
     held: list
     tiny: list
     # for each surface, whether sliding begins at once: see `stopped_by_impacts`
@@ -64,7 +64,7 @@ class Judged(NamedTuple):
 def iteration(
     functions: Functions, plan: Plan, carried: LoopState
 ) -> tuple[LoopState, Record]:
-    """Take one attempted step."""
+    """Take one attempted step, and return the new loop state and the log row."""
     with functions.sharing():
         return _iterate(functions, plan, carried)
 
@@ -85,7 +85,7 @@ def _iterate(
     landing = land(functions, plan, carried, end, made, *parts)
     chatter, begins = landing.chatter, landing.begins
 
-    # in contact, the state is moved onto the surface a second time, then checked
+    # in contact, the state is moved onto the surface again; its change must be small
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
     converged = ~sticking | settles(functions, carried, made, landing, settled)
     held = _judge_contacts(carried, end, landing, judged)
@@ -135,7 +135,7 @@ def _iterate(
         fits=made.effort <= 1.0,
         finite=finite,
         shorter=_shorter(functions, end, judged, held, converged, jam),
-        # the next attempt to find the state in contact starts from here
+        # the initial guess of the next attempt to find the state in contact
         guess=left if functions.planar else carried.x,
         settling=~converged & functions.planar,
         stopped=stopped,
@@ -172,7 +172,7 @@ def _iterate(
 
 
 def _suppressed(carried: LoopState, judged: Judged) -> tuple:
-    """Return for each constraint the largest gap that contact has suppressed."""
+    """Return the largest displacement that each contact has suppressed."""
     pairs = zip(carried.contact, judged.held, carried.held, strict=True)
     return tuple(jnp.where(c, new, old) for c, new, old in pairs)
 
@@ -185,7 +185,7 @@ def _judge_flights(
     made: Step,
     rounding,
 ) -> Judged:
-    """Detect events at the gaps that are open."""
+    """Detect events at the open gaps, and at the switching surfaces."""
     h, jets = end.length, made.jets
     slack = [2e-12 * s + b for s, b in zip(carried.sizes, carried.blur, strict=True)]
     free = [~c for c in carried.closed]
@@ -216,8 +216,8 @@ def _judge_flights(
         verdicts = jumped_across(carried, verdicts, h, stops)
     flown = earliest(verdicts)
     natural = jnp.minimum(carried.longest, plan.longest_step)
-    # the gap that the multipliers suppress also counts, because rounding is relative
-    # to it
+    # the displacement that the multipliers suppress also counts, because rounding is
+    # relative to it
     held = [
         jnp.maximum(s, natural * natural * jnp.abs(j.acceleration))
         for s, j in zip(carried.held, carried.jets, strict=False)
@@ -237,7 +237,7 @@ def _judge_flights(
 def _judge_contacts(
     carried: LoopState, end: StepEnd, landing: Landing, judged: Judged
 ) -> StepVerdict:
-    """Detect events at the gaps that are closed."""
+    """Detect releases at the closed gaps."""
     if not carried.held:
         h, no = end.length, jnp.asarray(False)
         return StepVerdict(no, jnp.full_like(h, jnp.inf), no, 0.0 * h, 0.0 * h)
@@ -276,7 +276,7 @@ def _shorter(
 
 
 def _stale(carried, landing: Landing, released) -> tuple:
-    """Return whether the jets are not those of the new mode: see `LoopState`."""
+    """Return the flag for jets that are not those of the new mode: see `LoopState`."""
     if not carried.stale:
         return ()
     after = jnp.where(released, 1.0, jnp.where(carried.completing, COMPLETED, 0.0))
@@ -323,7 +323,7 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
 
 
 def _waits_for_release(carried, jets, flown, natural, tiny):
-    """Return whether a contact releases before the impact found in a step.
+    """Return whether a contact releases before the impact that was found in a step.
 
     The impact is logged after the release.
     """
@@ -337,7 +337,7 @@ def _waits_for_release(carried, jets, flown, natural, tiny):
 
 
 def _where_passed(functions, plan, passed, t, x, mode, jets):
-    """Return the jets on the far side of a breakpoint if one was passed."""
+    """Return the jets, on the far side of a breakpoint if one was passed."""
     fresh = functions.jets(after(t, plan.t1 - plan.t0), x, mode)
     return tuple(
         Jet(*select(passed, new, old)) for new, old in zip(fresh, jets, strict=True)

@@ -10,19 +10,19 @@ from ._loop_state import LoopState
 from ._step import seen_from_inside, Step, StepEnd
 
 
-# compliance of a contact, relative to that without friction, up to which it counts as
+# a compliance of the contacts up to this, relative to that without friction, counts as
 # zero
 _ZERO = 1e-9
-# fraction of the longest step below which a step is not repeated
+# a step that is shorter than this fraction of the longest step is not repeated
 _TINY = 1e-12
 
 
 class Jam(NamedTuple):
-    """The outcome of a step for the compliance of the contacts."""
+    """The result of checking the compliance of the contacts in a step."""
 
     # whether the compliance has fallen to zero at the end of the step
     near: Any
-    # whether the step ends well beyond that, and a better length for it
+    # whether the step ends well beyond that point, and a better length for it
     retake: Any
     length: Any
 
@@ -46,10 +46,10 @@ def jam_of_step(
 
 
 def jams_after(functions: Functions, jam: Jam, good, begins, t, x, mode):
-    """Return whether the motion cannot go on from the end of a `good` step.
+    """Return whether the motion cannot continue after the end of a `good` step.
 
-    It also examines the mode after an event. A chatter that `begins` to be completed
-    has not led to contact yet.
+    The new mode, which an event may have changed, is examined as well. If a chatter
+    `begins` to be completed, there is no contact yet, so nothing is examined.
     """
     if not functions.rubs:
         return jnp.asarray(False)

@@ -19,10 +19,11 @@ def jumping_components(
     """Return, for each surface, the components of the rates that its side changes.
 
     Without contacts, only the branch changes with the side; in contact, friction also
-    does. The components are read from the programs of both, scalar by scalar. If the
-    switching function of a surface depends on none of them, none is returned for this
-    surface: the motion approaches it at the same speed on either side, so it cannot
-    slide along it. An example is a stop at a position, which changes a force.
+    does. The components are found from the traced programs of both, scalar by scalar.
+    If the switching function of a surface depends on none of these components, none is
+    returned for this surface: the motion crosses the surface at the same speed on both
+    sides and cannot slide along it. An example is a stop at a position, which changes a
+    force.
 
     Args:
         system: The system; only its structure matters.

@@ -1,4 +1,4 @@
-"""Apply the impact at the end of a step, and decide whether to complete its chatter."""
+"""Apply the impact at the end of a step, and complete the chatter that follows it."""
 
 from typing import Any, NamedTuple
 
@@ -17,8 +17,8 @@ from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
 
 
-# changes of the normal velocities by a joint impact below this fraction of the largest
-# are rounding
+# changes of the normal velocities by a joint impact that are below this fraction of the
+# largest change are rounding errors
 _JOINT = 1e-13
 
 
@@ -26,12 +26,12 @@ class Landing(NamedTuple):
     """The end of a step, with the impact there if it `lands` (ends in an impact)."""
 
     t: Any
-    # the time at which functions are evaluated
+    # the time at which functions are evaluated, moved off breakpoints
     seen: Any
     x: tuple
     mode: tuple
     jets: list
-    # which constraint was hit
+    # which constraints were hit, or which surface was crossed
     hit: list
     impact: Impact
     chatter: Rest
@@ -45,7 +45,7 @@ class Landing(NamedTuple):
     hidden: Any
     # whether the impact loses energy
     loses: Any
-    # whether a constraint is hit, not a switching surface crossed
+    # whether a constraint is hit, rather than a switching surface crossed
     strikes: Any
     # whether, from here on, the motion slides along the surface that it has reached,
     # whether it leaves one along which it slid, and whether it can do neither
@@ -112,7 +112,7 @@ def land(
     else:
         jets = functions.jets(seen, x, mode)
 
-    # do the remaining impacts take negligible time?
+    # decide whether the remaining impacts can be completed by a formula
     rebound = jnp.maximum(
         of_constraint([j.velocity for j in jets], flown.constraint), 0.0
     )
@@ -158,14 +158,14 @@ class _Ending(NamedTuple):
 def _ending(
     functions, plan, carried, end, impact, speeds, jets, mode, hit, fastest, rounding
 ) -> _Ending:
-    """Complete the impacts after this one, on its constraint or on several."""
+    """Complete the impacts that follow this one, on its constraint or on several."""
     if not functions.m:
         return _Ending(no_rest(impact), jnp.asarray(False), [], [])
     chatter = rest_of_chatter(
         functions, plan, impact, speeds, jets, mode, end.stop, rounding
     )
     # the sequence must be advanced enough, or the rebound so slow that rounding hides
-    # the next flight: if its height v^2 / 2a is below 250 times the rounding
+    # the next flight, whose height v^2 / 2a is then below 250 times the rounding error
     deep = impact.rebound <= plan.depth * fastest
     low = 500 * of_constraint(carried.blur, impact.constraint)
     hides = impact.rebound * impact.rebound <= low * _pull(jets, impact)
@@ -190,7 +190,7 @@ def _ending(
 
 
 def _kept_contacts(functions, carried, lands, joins, t, before, after):
-    """Return the contacts kept after an impact, which may break contact elsewhere.
+    """Return the contacts that remain after an impact, which may break other contacts.
 
     A contact breaks if the impact changes its normal velocity by more than rounding; if
     it took part in the impact, rounding is relative to the largest change.
@@ -211,16 +211,16 @@ def _kept_contacts(functions, carried, lands, joins, t, before, after):
 
 
 def _pull(jets, impact):
-    """Return the size of the acceleration of the gap that was hit."""
+    """Return the magnitude of the acceleration of the gap that has closed."""
     return jnp.abs(of_constraint([j.acceleration for j in jets], impact.constraint))
 
 
 def _hides(carried, impact, jets, roundings):
     """Return whether the flight after or before an impact is lost in rounding.
 
-    The height of the flight after it is v^2 / 2a; without an acceleration towards the
-    constraint, the height of the flight before it was at most its final speed times its
-    duration.
+    The height of the flight after the impact is v^2 / 2a. Without an acceleration
+    towards the constraint, the height of the flight before the impact was at most the
+    final speed of that flight times its duration.
     """
     rounding = of_constraint(roundings, impact.constraint)
     pulled = _pull(jets, impact)

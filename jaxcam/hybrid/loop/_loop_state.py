@@ -16,8 +16,8 @@ from ._start import first_sides, first_status
 
 # the flag `stale` after a chatter has been completed
 COMPLETED = 1.5
-# the first scale of the distance from a surface is at least the distance that the
-# motion covers in this part of the longest step
+# the initial scale of the distance from a surface is at least the distance that the
+# motion covers in this fraction of the longest step
 _PART = 1e-6
 
 
@@ -43,8 +43,8 @@ class LoopState(NamedTuple):
     scale: tuple
     # resolution of each gap
     blur: tuple
-    # for each constraint, the largest gap that contact has suppressed: the gap that the
-    # multiplier would open over the longest allowed step
+    # for each constraint, the largest displacement that contact has suppressed: that
+    # which the multiplier would cause in the longest allowed step
     held: tuple
     # for several constraints: time of the last impact on each, and number of
     # consecutive impacts whose flights are below rounding
@@ -61,7 +61,7 @@ class LoopState(NamedTuple):
     # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
     extents: tuple
-    # limits the first steps; it grows with each accepted step
+    # limit on the first steps, which grows with each accepted step
     ramp: Any
     failures: Any
     # a code of `codes.py`
@@ -93,7 +93,7 @@ class LoopState(NamedTuple):
 
     @property
     def sizes(self) -> tuple:
-        """The largest value of each distance; 1 for that from the end of sliding."""
+        """The largest value of each distance so far; 1 while the motion slides."""
         if not self.stale:
             return self.scale
         sliding = (jnp.asarray(False),) * len(self.held) + self.sliding
@@ -124,8 +124,8 @@ def first_state(
     """Return the first loop state, with contact if gap and velocity are zero and a < 0.
 
     Without a normal force, contact is assumed; it ends as soon as a tensile force acts.
-    An invalid start becomes NaN. `longest` is the longest allowed step (s), and
-    `period` that of the forcing.
+    The state of an invalid start becomes NaN. `longest` is the longest allowed step
+    (s), and `period` the period of the forcing (s).
     """
     m, free = functions.m, tuple(jnp.asarray(False) for _ in range(functions.m))
     sides, crossings, slides, stuck = first_sides(functions, t0, x, free)
@@ -147,7 +147,7 @@ def first_state(
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
         gap, velocity = jet.gap, jet.velocity
         near = jnp.abs(gap) <= tiny
-        # flights below rounding do not count, nor do the impacts that lead to them
+        # flights lower than rounding, and the impacts before them, count as contact
         hop = tiny * jnp.abs(jet.acceleration)
         low = (jet.acceleration < 0) & (velocity * velocity <= hop)
         touching = near & ((jnp.abs(velocity) <= slow) | low)
@@ -166,7 +166,7 @@ def first_state(
             )
         )
     if m and functions.slidable:
-        # contact forces and their friction also hold the motion on a surface
+        # contact forces and their friction may also hold the motion on a surface
         found = first_sides(functions, t0, x, tuple(contact))
         sides, crossings, slides, stuck = found
         status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
@@ -215,7 +215,7 @@ def first_state(
 
 
 def _first_scale(jets, m: int, longest) -> tuple:
-    """Return the first scales of the gaps, and of the distances from surfaces.
+    """Return the initial scales of the gaps, and of the distances from surfaces.
 
     A distance that is zero at the start, such as that of a body that sticks, still has
     a scale: the distance that the motion off the surface covers in a small part of the
@@ -228,8 +228,8 @@ def _first_scale(jets, m: int, longest) -> tuple:
 
 
 def _presses(jet: Jet, tiny):
-    """Return whether a constraint touched with zero velocity is under compression, or
-    about to be.
+    """Return whether a constraint that is touched with zero velocity is under
+    compression, or about to be.
 
     A flight due to acceleration and jerk whose height 2 a^3 / (3 j^2) does not exceed
     `tiny` is ignored.

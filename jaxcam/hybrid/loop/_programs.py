@@ -58,10 +58,10 @@ _MOST = 128
 
 
 class Programs:
-    """The programs of one kind of system, and what its structure determines.
+    """The programs of one kind of system, and properties derived from its structure.
 
-    They are called with the parameters, split into scalars unless `plain`, and the
-    arguments.
+    The programs are called with the parameters, split into scalars unless `plain`, and
+    the arguments.
     """
 
     def __init__(self, static, shapes, n: int, plain: bool):
@@ -99,7 +99,7 @@ class Programs:
 
     @property
     def portable(self) -> bool:
-        """Whether the programs contain nothing of the trace in which they were made."""
+        """Whether the programs contain no values of the trace that made them."""
         made = self.by_name.values()
         return not self._plain and all(one.portable for one in made)  # pyright: ignore
 
@@ -217,5 +217,5 @@ def programs_of(static, parameters, n: int, *, plain: bool, shared: bool) -> Pro
     try:
         return _KNOWN.get(kind, make, lambda made: made.portable)
     except TypeError:
-        # a part is not hashable, for example an array of integers
+        # a part of the system, for example an array of integers, is not hashable
         return make()

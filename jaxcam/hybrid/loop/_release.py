@@ -1,4 +1,4 @@
-"""Check a step of contact: it continues, or the constraint releases."""
+"""Check a step in contact: contact continues, or the constraint releases."""
 
 import jax.numpy as jnp
 
@@ -52,7 +52,7 @@ def judge_contact(
     touches = falls & (8 * peak**2 <= rounding * curved)
     # a multiplier that keeps rising after an inflection releases
     touches = touches & ~(passed & (curvature > 0) & (a1 * h * h > rounding))
-    # it may have released before the zero at the end of the step
+    # the constraint may have released before the zero at the end of the step
     early = (a0 < 0) & (first > 0)
     lets_go = near & (locating | (~touches & ~early & (offset <= room)))
     lets_go = (lets_go | (enclosed & ~touches)) & ~completing

@@ -1,4 +1,4 @@
-"""Check whether chatter may be completed after an impact, and compute its end."""
+"""Check whether the chatter after an impact may be completed, and compute its end."""
 
 from typing import Any, NamedTuple
 
@@ -10,7 +10,10 @@ from ._select import of_constraint, select
 
 
 class Rest(NamedTuple):
-    """The remaining impacts of a chatter sequence, starting with this impact."""
+    """The completion of a chatter sequence, starting after an impact: whether it is
+    possible, its duration (s), the state without normal velocity, and the normal
+    acceleration of this state and its rate.
+    """
 
     possible: Any
     duration: Any
@@ -20,7 +23,7 @@ class Rest(NamedTuple):
 
 
 class Impact(NamedTuple):
-    """An impact: scalars, and states as tuples of them."""
+    """An impact on one constraint, or on several; states are tuples of scalars."""
 
     t: Any
     before: tuple
@@ -31,7 +34,7 @@ class Impact(NamedTuple):
     constraint: Any
     # whether it is an impact on several constraints at once
     several: Any
-    # whether the law is that of an impact on several constraints
+    # whether the impact law for several constraints applies
     joins: Any
 
 
@@ -52,7 +55,8 @@ def rest_of_chatter(
     for k in range(1, functions.m):
         state = select(constraint == k, states[k], state)
     if functions.rubs and functions.joins:
-        # coefficient and direction, if the impact is one on all closed gaps
+        # coefficient of restitution and state, if the impact law is that of all closed
+        # gaps
         change = jnp.where(joins & (rebound > approach), rebound - approach, 1.0)
         ratio = rebound / jnp.where(joins & (approach < 0), -approach, 1.0)
         r0 = jnp.where(joins, ratio, r0)
@@ -62,9 +66,9 @@ def rest_of_chatter(
     a = of_constraint([j.acceleration for j in jets], constraint)
     j = of_constraint([j.jerk for j in jets], constraint)
     small = rebound * jnp.abs(j) <= plan.smallness * (1 - r0) * a * a
-    # the formula is for the impacts on one constraint
+    # the formula applies only to impacts on one constraint
     possible = (a < 0) & small & (r0 < 1) & ~several
-    # quantities of the state without normal velocity
+    # acceleration and rate at the state without normal velocity
     a = jnp.where(possible, a - damping * rebound, -1.0)
     rate = j - damping * a
     r0 = jnp.where(possible, r0, 0.0)
@@ -78,18 +82,18 @@ def rest_of_chatter(
     contact = closed(mode, functions.m, len(jets))
     jump = jnp.where(possible & (rebound > approach), rebound - approach, 1.0)
     for k, jet in enumerate(jets if len(jets) > 1 else ()):
-        # no other gap closes in the meantime; over such a short time, it is a parabola
-        # whose acceleration includes the mean force of the remaining impacts
+        # no other gap may close in the meantime; over such a short time, a gap is a
+        # parabola whose acceleration includes the mean force of the remaining impacts
         mean = jet.acceleration - a * (jet.velocity - speeds[k]) / jump
         strongest = jnp.minimum(jet.acceleration, mean)
         left = jet.gap + duration * (jet.velocity + duration * strongest / 2)
         clear = (constraint == k) | contact[k] | (left > 0)
         if k < functions.m:
-            # a body that leaves the constraint, and is still leaving it at the end
+            # also clear: a body that leaves the constraint, and still does at the end
             rises = jet.velocity + duration * strongest > 0
             clear = clear | (rises & (jet.gap >= -rounding[k]))
         else:
-            # a slip that friction has stopped
+            # also clear: a slip that friction has stopped
             clear = clear | (jet.gap <= rounding[k])
         possible = possible & clear
     return Rest(possible, duration, state, a, rate)

@@ -28,8 +28,8 @@ class JointRest(NamedTuple):
 def rest_together(
     functions: Functions, impact: Impact, jets, mode, hit, natural, fastest, rounding
 ) -> JointRest:
-    """Return whether the impacts after this one, on several constraints, are
-    negligible.
+    """Return the end of the impacts after this one on several constraints, and whether
+    these impacts are negligible.
 
     **Arguments:** the `jets` after the impact, the `mode` then, which constraint was
     `hit`, the longest allowed step (s), the `fastest` rebound so far, and the
@@ -58,7 +58,7 @@ def loses_energy(impact: Impact):
 
 
 def _ends(jet, pull, short, slow, rounding):
-    """Return whether a gap remains closed except for negligible flights.
+    """Return whether a gap remains closed, apart from negligible flights.
 
     **Arguments:** the acceleration `pull` (positive) towards the constraint, and the
     squares of a negligible time and of a negligible velocity.

@@ -16,8 +16,8 @@ from ._iterate import iteration, Record
 from ._loop_state import LoopState
 
 
-# iterations between two checks for running batch elements, and between two writes to
-# the log, which are costly under vmap
+# number of iterations between two checks for running batch elements, and between two
+# writes to the log, which are costly under vmap
 _BLOCK = 16
 
 
@@ -70,8 +70,8 @@ def run_raw(
         carried, record = iteration(functions, plan, carried)
         return carried, jnp.stack(row(record, carried))
 
-    # scalars of a single run are never computed twice; keeping them would only take
-    # compilation time
+    # in a single run, no scalar is computed twice, so keeping scalars in memory would
+    # only increase the compilation time
     alone = company == "one"
     keeping, kept = with_kept(body, carried, on=not (functions.plain or alone))
     width = len(row(_empty_record(carried), carried))
@@ -100,7 +100,7 @@ def run_raw(
 
 
 def attempts(functions: Functions, plan: Plan, carried: LoopState, row):
-    """Run a block of attempts of one trajectory, to be mapped over many.
+    """Run a block of attempts of one trajectory, to be mapped over many trajectories.
 
     Returns:
         The batch element, and for each number in `row` an array with one entry per
@@ -198,7 +198,7 @@ def numbers_of_row(record: Record) -> list:
 
 
 def log_of(log, n: int) -> Log:
-    """Return the log of rows of numbers, for states of `n` components."""
+    """Return the `Log` that rows of numbers contain, for states of `n` components."""
     return Log(
         kind=log[:, 0],
         constraint=log[:, 1],
@@ -210,7 +210,7 @@ def log_of(log, n: int) -> Log:
 
 
 def rows_of_kind(log: Log, *wanted: RowKind):
-    """Return a mask of the rows of one of the kinds."""
+    """Return a mask of the rows whose kind is among those `wanted`."""
     mask = log.kind == float(wanted[0])
     for w in wanted[1:]:
         mask = mask | (log.kind == float(w))

@@ -26,7 +26,7 @@ def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
     A component on which a gap depends is measured from its start and has the scale of
     that gap, wherever the origin of its coordinate is; for any other component, the
     scale is its magnitude. With several gaps, the smallest scale counts. A gap that
-    cannot be distinguished from zero (`tinies`) is zero.
+    cannot be distinguished from zero (up to its value in `tinies`) counts as zero.
     """
     origin, found = [], []
     for i, component in enumerate(x):
@@ -37,8 +37,8 @@ def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
             height, share = jnp.abs(jet.gap), jnp.abs(lift[i])
             height = jnp.where(height <= tiny, 0.0, height)
             seen = share > 0
-            # the component's share of the shortest path to the surface, and the path to
-            # it if only this component changes
+            # the component's share of the shortest path to the surface, and the length
+            # of the path along which only this component changes
             alone = height * square / jnp.where(seen, share, 1.0)
             near = jnp.clip(own, height * share, jnp.where(seen, alone, jnp.inf))
             least = jnp.minimum(least, jnp.where(seen, near, jnp.inf))
@@ -120,7 +120,7 @@ def error_norm(error, allowed):
 
 
 def says_nothing(effort, tolerance):
-    """Return whether the error estimate of a step, at this error norm, is only
+    """Return whether the error estimate of a step with the error norm `effort` is only
     rounding.
     """
     return effort * tolerance <= _ROUNDING

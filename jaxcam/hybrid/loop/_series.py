@@ -14,18 +14,19 @@ def taylor(x, rates, tau):
 
 
 def taylor_of_release(functions, x, rates, frame, jets, tau, mode):
-    """Return the sticking motion over the short time `tau` (s) to release, to second
-    order.
+    """Return the state after sticking for the short time `tau` (s) that is left to the
+    release, to second order.
 
-    **Arguments:** `rates` of the free flight from `x`, its `frame` and `jets`, and the
-    mode.
+    **Arguments:** the `rates`, the `frame` and the `jets` at `x`, and the mode. The
+    rates of a planar system are those of free flight.
     """
     first, second, _ = rates
     if not functions.planar:
         return tuple(
             x[i] + tau * (first[i] + tau * second[i] / 2) for i in range(len(x))
         )
-    # F_s = F - a D: with a = 0 at release, only its rate remains
+    # the sticking field is F - a D; because a is zero at the release, only the rate of
+    # a contributes to the second derivative
     a, rate = jets[0].acceleration, jets[0].jerk
     push = frame.push[0]
     return tuple(

@@ -17,7 +17,7 @@ def settles(
     allowed = [1e-7 * (jnp.abs(a) + w) for a, w in pairs]
     if functions.m > 1:
         # a component that has never moved, such as the angle of a body that lands flat,
-        # has no scale
+        # has no scale, so the rounding of the gaps is allowed as well
         for k, blur in enumerate(carried.blur[: functions.m]):
             ways = zip(made.frame.lift[k], made.frame.push[k], strict=True)
             moves = [jnp.abs(a) + jnp.abs(b) / carried.longest for a, b in ways]

@@ -1,4 +1,4 @@
-"""Reject invalid starts, traced or not, and find on which sides motions start."""
+"""Reject invalid starts, traced or not, and find the sides on which motions start."""
 
 import jax.numpy as jnp
 
@@ -37,7 +37,7 @@ def first_sides(functions: Functions, t, x, contact):
     Returns:
         Flags of the negative sides, then of sliding; the jets of the surfaces there, as
         if the motion did not slide; whether the motion slides along a surface; and
-        whether it would have to, but cannot.
+        whether it would have to slide, but cannot.
     """
     if not functions.k:
         return (), [], False, False
@@ -63,8 +63,8 @@ def first_sides(functions: Functions, t, x, contact):
         touched[k] = on
         if k in functions.slidable:
             slack = functions.slack((*contact, *sides, *free))[k]
-            # rate at which both branches together hold the motion on the surface; one
-            # of them may drive it away at up to `slack` times this rate
+            # rate at which the two branches together hold the motion on the surface;
+            # one of them may drive it away at up to `slack` times this rate
             together = -(own.velocity + other.velocity)
             fastest = jnp.maximum(own.velocity, other.velocity)
             slides[k] = on & (together > 0) & (fastest <= slack * together)

@@ -18,7 +18,7 @@ from ._select import any_of, select
 
 
 class StepEnd(NamedTuple):
-    """The end of a step."""
+    """The end of a step, and the times that limit it."""
 
     length: Any
     t: Any
@@ -36,10 +36,10 @@ class StepEnd(NamedTuple):
 class Step(NamedTuple):
     """The quantities at the end of a completed step."""
 
-    # the end from Runge-Kutta, and its projection onto the contact surfaces
+    # the final state from Runge-Kutta, and its projection onto the contact surfaces
     raw: tuple
     x: tuple
-    # the gaps, and the projection of states onto the surface
+    # the gaps and their derivatives, and the directions of this projection
     jets: list
     frame: Frame
     # first, second and third time derivatives of the state
@@ -77,7 +77,7 @@ def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
 
 
 def seen_from_inside(plan: Plan, end: StepEnd):
-    """Return a function that moves times of a step inside the adjacent breakpoints."""
+    """Return a function that moves times strictly between the adjacent breakpoints."""
     if not plan.breaks:
         return lambda t: t
     (low, high), span = end.sides, plan.t1 - plan.t0
@@ -113,7 +113,8 @@ def make_step(
         effort = jnp.where(sticking, 0.0, effort)
     jets = functions.jets(seen, x, carried.mode)
     projected = functions.onto(frame, jets, x, carried.mode)
-    # with surfaces, the jets contain the rates at x, and the projection is very small
+    # with surfaces, the rates at x are known from the jets, and differ very little from
+    # those at the projection
     start = x if functions.k else projected
     rates = functions.taylor(seen, start, carried.mode)
     return Step(x, projected, jets, frame, rates, effort, scale)

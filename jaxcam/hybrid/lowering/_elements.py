@@ -9,8 +9,8 @@ from ._known import is_known, join_known
 from ._scalars import forced, Memory, Part
 
 
-# number of elements above which an array is kept whole: most long arrays are tables,
-# of which an operation reads a few elements
+# arrays with more elements than this are kept whole: most of them are tables, of which
+# an operation reads only a few elements
 _LONG = 64
 
 
@@ -30,7 +30,7 @@ def split(array) -> np.ndarray:
 
 
 def join(elements: np.ndarray):
-    """Return the inverse of `split`."""
+    """Return the array that consists of these elements: the inverse of `split`."""
     if elements.shape == ():
         return jnp.asarray(elements[()])
     whole = _whole(elements)
@@ -44,7 +44,7 @@ def join(elements: np.ndarray):
 
 @no_type_check
 def _whole(elements: np.ndarray):
-    """Return the long array of which these are all elements, or `None`."""
+    """Return the long array that consists of exactly these elements, or `None`."""
     first = elements.flat[0] if elements.size else None
     if not isinstance(first, Part) or first.whole.shape != elements.shape:
         return None
@@ -57,13 +57,13 @@ def _whole(elements: np.ndarray):
 
 
 def join_traced(elements: np.ndarray, memory: Memory):
-    """Return the array of elements, of which some may not have been traced yet."""
+    """Return the array of these elements, tracing those that are not traced yet."""
     whole = _whole(elements)
     return join(traced(elements, memory)) if whole is None else whole
 
 
 def traced(elements: np.ndarray, memory: Memory) -> np.ndarray:
-    """Return an array of scalars that have been traced, or are known."""
+    """Return these elements as an array of scalars that are all traced or known."""
     out = np.empty(elements.shape, dtype=object)
     for index in np.ndindex(elements.shape):
         out[index] = forced(elements[index], memory)

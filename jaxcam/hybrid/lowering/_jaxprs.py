@@ -15,7 +15,8 @@ from jax.interpreters import partial_eval
 
 # calls that only group operations
 _GROUPS = frozenset({"jit", "pjit", "closed_call", "call", "remat", "checkpoint"})
-# linear algebra by LAPACK, Fourier transforms, and calls back to Python
+# operations outside the compiled code: linear algebra, Fourier transforms, and calls
+# back to Python
 _LIBRARY = frozenset(
     """
     cholesky cholesky_update debug_callback eig eigh fft ffi_call geqp3 geqrf
@@ -30,7 +31,7 @@ _CALLS = frozenset(
     top_k
     """.split()
 )
-# name of a compiled function whose custom derivative only saves work
+# name given to compiled functions whose custom derivative only saves work
 _SAVING = "its_derivative_only_saves_work"
 
 
@@ -98,7 +99,7 @@ def has_saving_rule(equation) -> bool:
 
 
 def calls_library(jaxpr) -> bool:
-    """Return whether some part of a program calls a library or Python."""
+    """Return whether any part of a program calls a library or Python."""
     return any(e.primitive.name in _LIBRARY for e in equations(jaxpr))
 
 

@@ -42,7 +42,7 @@ FOLDED = frozenset(_NUMPY)
 
 
 def folded(name: str, scalars):
-    """Return the result of an operation on known scalars."""
+    """Return the result of an operation in `FOLDED` on known scalars."""
     with np.errstate(all="ignore"):
         return _NUMPY[name](*scalars)
 
@@ -54,7 +54,7 @@ def is_known(element) -> bool:
 
 
 def join_known(elements: np.ndarray):
-    """Join numbers that are known while tracing."""
+    """Return an array of elements that are known while tracing."""
     flat = [np.asarray(e) for e in elements.ravel()]
     return np.stack(flat).reshape(elements.shape) if flat else np.zeros(elements.shape)
 

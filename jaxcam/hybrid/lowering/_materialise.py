@@ -20,7 +20,8 @@ from jax.interpreters import partial_eval
 from ._jaxprs import calls_library
 
 
-# a value is kept if recomputing it in its users would take more operations than this
+# a value is kept if recomputing it wherever it is used would take at least this many
+# operations
 _THRESHOLD = 100
 # operations that cost more than an addition
 _COST = {"div": 4, "sqrt": 6, "custom_jvp_call": 40, "sin": 30, "cos": 30, "pow": 40}
@@ -83,7 +84,7 @@ def with_kept(body: Callable, carry, on: bool = True):
     """Return a loop body that also carries its shared scalars.
 
     **Arguments:** `body(carry) -> (carry, row)`, and an example of the carry, a pytree
-    of scalars. The row may be a pytree. Without `on`, nothing is kept.
+    of scalars. The row may be a pytree. If `on` is false, nothing is kept.
 
     Returns:
         The new body, a function of `(carry, kept)`, and the initial `kept`.
@@ -97,7 +98,7 @@ def with_kept(body: Callable, carry, on: bool = True):
 
     closed, shape = jax.make_jaxpr(flat_body, return_shape=True)(*leaves)
     outputs = jax.tree.structure(shape)
-    # without this, unused values would be kept too
+    # otherwise, unused values would also be kept
     pruned, _ = partial_eval.dce_jaxpr(
         closed.jaxpr, [True] * outputs.num_leaves, instantiate=True
     )
@@ -149,7 +150,8 @@ def without_library(function: Callable, argument):
 
 
 def depend_on(value, kept):
-    """Return `value`, which then depends on all kept scalars, so that all are computed.
+    """Return `value`, a count, made to depend on all kept scalars, so that the compiler
+    computes all of them.
 
     Adding 1e-300 does not change any possible count.
     """

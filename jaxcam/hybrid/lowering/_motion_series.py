@@ -14,7 +14,7 @@ from ._taylor import coefficient, Series
 
 
 class MotionSeries(NamedTuple):
-    """The motion through a state, as split arrays."""
+    """Time derivatives of the motion through a state, as arrays of scalars."""
 
     rates: list
     """The first, second, ... time derivative of the state, `(n,)` each."""
@@ -27,7 +27,8 @@ def motion_series(function: Callable, orders, *example) -> SplitProgram:
 
     **Arguments:** `function(parameters, t, x, *rest)` of arrays, which returns the
     vector field, `(n,)`, and a pytree of arrays; a pytree with the highest derivative
-    of each of these, beyond which zero is returned; and examples of its arguments.
+    of each of these arrays, beyond which zero is returned; and examples of the
+    arguments of the function.
 
     Returns:
         A function of the same arguments with split arrays as leaves.
@@ -46,7 +47,7 @@ def motion_series(function: Callable, orders, *example) -> SplitProgram:
 
         def at(program, k: int):
             """Return the results of a program, with series up to order k."""
-            # all series have the same length, which limits that of their results
+            # all series have the same length, which also limits that of the results
             rates = (np.float64(1.0), *(np.float64(0.0),) * (k - 1))
             time = Series([t, *rates]) if k else t
             state = np.empty(len(powers), dtype=object)

@@ -29,8 +29,8 @@ MOVES = frozenset(
 
 @no_type_check
 def rearranged(equation, inputs) -> np.ndarray | None:
-    """Return the result of common rearrangements, using only numpy; otherwise
-    `None`.
+    """Return the result of a common rearrangement, found with numpy alone; `None` for
+    any other operation.
     """
     name, params, first = equation.primitive.name, equation.params, inputs[0]
     if name in ("reshape", "squeeze", "expand_dims", "copy"):
@@ -83,7 +83,7 @@ def _padded(array, fill, config) -> np.ndarray | None:
 
 
 def moved(equation, inputs, memory):
-    """Return the moved elements, found by applying the operation to indices."""
+    """Return the moved elements, which are found by moving their indices."""
     simple = rearranged(equation, inputs)
     if simple is not None:
         return simple
@@ -95,7 +95,7 @@ def moved(equation, inputs, memory):
             equation.primitive.bind(*map(jnp.asarray, (indices, *others)), **params)
         )
     if target.size and (target.min() < 0 or target.max() >= first.size):
-        # a gather with a fill value outside the range
+        # a gather that reads outside the array, where it returns a fill value
         whole = join_traced(first, memory)
         return split(equation.primitive.bind(whole, *others, **params))
     out = np.empty(target.shape, dtype=object)

@@ -1,8 +1,8 @@
 """Compile a loop as one kernel on the CPU, instead of hundreds of small ones.
 
 XLA's CPU backend compiles a small loop into a single function, but runs a large one as
-a sequence of kernels whose calls take longer than the arithmetic of a step. It marks
-small loops by an attribute on a call. This module sets the attribute in advance, only
+a sequence of kernels whose calls take longer than the arithmetic of a step. XLA marks
+small loops by an attribute of a call. This module sets the attribute in advance, only
 for the loop that it wraps; versions of XLA without the attribute ignore it. The results
 are the same.
 """
@@ -17,8 +17,8 @@ def one_kernel(function: Callable, batch: bool = False, on: bool = True) -> Call
 
     With `batch`, the calls inside are inlined, which is better for wide vectors and
     worse for individual trajectories and their derivatives. A function that the backend
-    cannot compile as one kernel, because it needs a library, is compiled as usual;
-    without `on`, every function is.
+    cannot compile as one kernel, because it needs a library, is compiled as usual, as
+    is every function if `on` is false.
     """
     if not on:
         return function

@@ -46,7 +46,7 @@ class Packed(NamedTuple):
     packing: Packing
 
     def some(self, lanes) -> tuple:
-        """Return the numbers and other leaves of some batch elements."""
+        """Return the numbers and the other leaves of the given batch elements."""
         return self.numbers[:, lanes], [leaf[lanes] for leaf in self.apart]
 
 

@@ -59,12 +59,12 @@ _PRIMITIVES = {
 
 
 class SplitProgram:
-    """A traced function of split arguments."""
+    """A traced function whose arguments are arrays of scalars, made by `split`."""
 
     def __init__(self, call: Callable, *programs):
         self._call = call
         constants = [value for program in programs for value in program.consts]
-        # whether none of the constants belongs to the trace of the caller
+        # whether no constant is a value of the trace in which the program was made
         self.portable = not any(isinstance(value, Tracer) for value in constants)
 
     def __call__(self, *arguments, memory: Memory | None = None):
@@ -134,7 +134,8 @@ def _evaluate(jaxpr, consts, arguments, memory):
 def _apply(equation, inputs, memory):
     name = equation.primitive.name
     params = equation.params
-    # a call whose rule only saves work, or is for reverse mode only, becomes its body
+    # a call is replaced by its body if its derivative rule only saves work, or is for
+    # reverse mode only
     if has_saving_rule(equation) or name == "custom_vjp_call":
         inside = params["call_jaxpr"].jaxpr, params["call_jaxpr"].consts
     else:
@@ -162,7 +163,7 @@ def _apply(equation, inputs, memory):
         return [_elementwise(equation, inputs, outputs[0].shape, memory)]
     if any(has_series(i.ravel()) for i in inputs):
         return _by_derivatives(equation, inputs, memory)
-    # a user-defined rule, such as a custom derivative, is among these parameters
+    # these parameters include a user-defined rule, such as a custom derivative
     params = equation.primitive.get_bind_params(params)
     made = equation.primitive.bind(*[join_traced(i, memory) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
@@ -272,7 +273,7 @@ def _rule_operation(equation, memory):
 
 
 def _by_derivatives(equation, inputs, memory):
-    """Evaluate any operation on arrays of series, by nested derivatives."""
+    """Return the results of an operation on arrays of series, by nested derivatives."""
     order = max(
         len(e.coefficients) - 1
         for i in inputs

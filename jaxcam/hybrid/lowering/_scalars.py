@@ -45,7 +45,7 @@ def _read(whole, *index):
 
 
 class Memory:
-    """The operations of one trace."""
+    """The operations of one trace, each stored once."""
 
     def __init__(self):
         self.made: dict[Any, Scalar] = {}
@@ -74,7 +74,7 @@ class Memory:
 
 @no_type_check
 def once(operation, params, elements, memory: Memory, dtype=None):
-    """Return the result of a primitive, or of a function of scalars.
+    """Return the result of a primitive or of a function of scalars, stored only once.
 
     **Arguments:** the operation and its parameters, its operands, and the type of the
     result if it is not that of the last operand.
@@ -153,13 +153,15 @@ def _defaults(name: str) -> dict:
     """Return the parameters that JAX adds whenever it applies a primitive."""
     if name != "mul":
         return {}
-    # reverse mode fails without them
+    # reverse mode fails without these parameters
     return jax.make_jaxpr(jax.lax.mul)(1.0, 1.0).eqns[0].params
 
 
 @no_type_check
 def _identity(name, scalars):
-    """Simplify an operation with zero or one; differentiation leaves many of these."""
+    """Return the simplified result of an operation with a known number, such as zero or
+    one, or with equal cases; otherwise `None`. Differentiation leaves many of these.
+    """
     if name == "select_n":
         which, *cases = scalars
         if is_known(which):

@@ -1,8 +1,9 @@
 """Sine and cosine in plain arithmetic.
 
 A library call inside a vectorised loop prevents the compiler from keeping the loop in
-registers. These few multiplications do not. Their absolute error is about 2e-16 for |x|
-< 1e6; beyond that, the reduction to half a turn loses digits in proportion to x.
+registers. The few multiplications used here do not. Their absolute error is about 2e-16
+for |x| < 1e6; beyond that, the reduction to half a turn loses digits in proportion
+to x.
 """
 
 from functools import partial
@@ -52,7 +53,8 @@ def sincos(x):
     return _arithmetic(x)
 
 
-# traced once for each shape, then copied: a loop body contains dozens of these
+# traced once for each shape, then copied, because a loop body contains it dozens of
+# times
 @partial(jax.jit, inline=True)
 def _arithmetic(x):
     halves = jnp.round(x * (1 / np.pi))
@@ -62,7 +64,7 @@ def _arithmetic(x):
     z4 = z2 * z2
     sine = r + r * z * _eight(_SINE, z, z2, z4)
     cosine = (1.0 - 0.5 * z) + z2 * _eight(_COSINE, z, z2, z4)
-    # half a turn changes both signs
+    # an odd number of half turns changes both signs
     pairs = 0.5 * halves
     sign = 1.0 - 4.0 * (pairs - jnp.floor(pairs))
     return sign * sine, sign * cosine

@@ -35,7 +35,7 @@ class Series:
 
 
 def coefficient(element, order: int):
-    """Return one coefficient of a series; a number is constant."""
+    """Return one coefficient of a series; a plain scalar is a constant series."""
     if not isinstance(element, Series):
         return element if order == 0 else _ZERO
     known = element.coefficients
@@ -138,7 +138,7 @@ def _power(apply, order, a, exponent: int):
 
 
 def _div(apply, order, a, b):
-    # q b = a
+    # the quotient q follows from q b = a
     found = [apply("div", a[0], b[0])]
     if order == 0:
         return found
@@ -151,7 +151,7 @@ def _div(apply, order, a, b):
 
 
 def _sqrt(apply, order, a):
-    # r r = a
+    # the root r follows from r r = a
     found = [apply("sqrt", a[0])]
     if order == 0:
         return found

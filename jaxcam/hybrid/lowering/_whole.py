@@ -159,7 +159,8 @@ def _batched(program: Program, axis, mapped: list[bool], wanted: list[bool]):
     """Return the program of a batch, and which outputs are batched: all that are
     `wanted`, and possibly others.
 
-    A program and the one from which it was derived agree on their common outputs.
+    A program and the one from which it was derived agree on which of their common
+    outputs are batched.
     """
     jaxpr, out = batch_jaxpr(program.jaxpr, axis, mapped, list(wanted))
     if program.plain is None:
@@ -205,7 +206,7 @@ ad.primitive_jvps[whole_p] = _jvp
 
 
 def _partly_known(trace, *tracers, program: Program):
-    """Apply partial evaluation: values are known, tangents are not."""
+    """Apply partial evaluation, in which values are known and tangents are unknown."""
     known = [tracer.is_known() for tracer in tracers]
     if program.plain is None or all(known):
         return trace.default_process_primitive(whole_p, tracers, {"program": program})
@@ -248,8 +249,8 @@ partial_eval.partial_eval_jaxpr_custom_rules[whole_p] = _partly_known_equation
 
 @functools.lru_cache(maxsize=256)
 def _without(program: Program, first: int) -> Program:
-    """Return the program without its first outputs, which are then computed
-    unnecessarily.
+    """Return the program without its first outputs, although it still computes
+    them.
     """
     jaxpr = program.jaxpr.jaxpr
     jaxpr = jaxpr.replace(
@@ -277,7 +278,7 @@ def _transpose(cotangents, *arguments, program: Program):
         total = jnp.zeros((), flat.dtype)
         for cotangent, moved in zip(cotangents, made, strict=True):
             if type(cotangent) is not ad.Zero:
-                # an unused result may have an infinite derivative
+                # the derivative of an unused result may be infinite
                 counts = jnp.where(cotangent == 0, 0, cotangent * moved)
                 total = total + jnp.sum(counts.astype(flat.dtype))
         return total

@@ -17,7 +17,7 @@ from ._events import Contacts, Impacts, Steps, Switches
 
 
 class Parts(NamedTuple):
-    """The padded pieces of a trajectory."""
+    """The parts of a trajectory, each padded to a fixed length."""
 
     impacts: Impacts
     contacts: Contacts
@@ -66,7 +66,7 @@ def assemble(
 
 
 def _sides(xp: ModuleType, negative, sliding):
-    """Return the sides of the surfaces, zero where the motion slides."""
+    """Return the sides of the surfaces, +1 or -1, or 0 while the motion slides."""
     return xp.where(sliding, 0.0, xp.where(negative, -1.0, 1.0))
 
 
@@ -89,7 +89,7 @@ def _nothing(xp: ModuleType, state, log: Log) -> tuple[Impacts, Contacts]:
 
 
 def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
-    """Return the events at switching surfaces; the log numbers these from `m` on."""
+    """Return the events at switching surfaces, which the log numbers from `m` on."""
     crossed = rows_of_kind(log, RowKind.SWITCH, RowKind.SLIDE, RowKind.LEAVE)
     number = xp.sum(crossed)
     index = _places(xp, crossed, size, 0)
@@ -151,7 +151,7 @@ def _contacts(xp: ModuleType, time, kept, count, max_contacts: int) -> Contacts:
 
 
 def _places(xp: ModuleType, mask, size: int, fill: int):
-    """Return `size` indices at which a mask holds, padded with `fill`."""
+    """Return the first `size` indices at which a mask is true, padded with `fill`."""
     if xp is jnp:
         return jnp.nonzero(mask, size=size, fill_value=fill)[0]
     found = np.flatnonzero(mask)[:size]

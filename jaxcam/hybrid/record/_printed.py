@@ -12,7 +12,7 @@ from ..programs import is_traced
 class Printed(eqx.Module):
     """A result that prints as a short table instead of its arrays.
 
-    Traced values, and batches created by `vmap`, are printed as ordinary modules.
+    Traced values, and batches created by `vmap`, are printed as Equinox modules.
     """
 
     @abc.abstractmethod

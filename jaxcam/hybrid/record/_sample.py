@@ -31,9 +31,9 @@ def pad(array, fill):
 
 
 class _Point(NamedTuple):
-    """The last integration point before a sample."""
+    """A sample, and the last integration point before it."""
 
-    # time of the sample, of the point and of the next one
+    # times of the sample, of the point and of the next point
     time: Any
     start: Any
     end: Any
@@ -44,7 +44,7 @@ class _Point(NamedTuple):
 
 
 class _Run(NamedTuple):
-    """A run that is sampled."""
+    """A run from which samples are taken."""
 
     # the prepared system
     system: Any
@@ -52,12 +52,12 @@ class _Run(NamedTuple):
     # times of the first and the last point
     first: Any
     last: Any
-    # distance that each component moves
+    # largest distance of each component from its start, to which errors are relative
     scale: Any
 
 
 def _sampled(run: _Run, point: _Point, shared: bool = True):
-    """Return the state at one time; NaN beyond the interval of the run."""
+    """Return the state at the time of one sample; NaN if the run does not cover it."""
     system, settings, first, last, scale = run
     n = point.state.shape[0]
     functions = Functions(system, n, settings.plain, shared=shared)

@@ -6,7 +6,7 @@ import numpy as np
 from ._sample import pad
 
 
-# points within each step at which the section function is evaluated
+# number of parts of each step at whose ends the section function is evaluated
 _PLACES = 8
 
 

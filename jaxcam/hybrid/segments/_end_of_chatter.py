@@ -65,7 +65,7 @@ def end_of_chatter(
 
 
 def _joint_end(motion, rebound: Rebound, ratio, tiny, longest) -> Rest | None:
-    """Return the `Rest` on several constraints, if flights before it are negligible.
+    """Return the `Rest` on several constraints, if the flights left are negligible.
 
     **Arguments:** the `ratio` of rebound to approach; others as in `end_of_chatter`.
     """
@@ -92,10 +92,10 @@ def _joint_end(motion, rebound: Rebound, ratio, tiny, longest) -> Rest | None:
 
 
 def _stays_alone(motion, rebound: Rebound, length: float, tiny) -> bool:
-    """Return whether no other gap closes during a chatter of some `length` (s).
+    """Return whether no other gap closes while a chatter lasts, for `length` (s).
 
-    Over such a short time a gap is a parabola, whose acceleration includes the mean
-    force of the remaining impacts.
+    Over such a short time, a gap is a parabola in time, whose acceleration includes the
+    effect of the mean force of the remaining impacts.
     """
     t, x, hit, contact, speeds = rebound[:5]
     gap, speed, free, _ = np.asarray(motion.jets(t, x)).T
@@ -103,7 +103,7 @@ def _stays_alone(motion, rebound: Rebound, length: float, tiny) -> bool:
     mean = free - free[hit] * jump / jump[hit] if jump[hit] > 0 else free
     left = gap + length * (speed + length * np.minimum(free, mean) / 2)
     rises = speed + length * np.minimum(free, mean) > 0
-    # a body that leaves the constraint, and is still leaving it at the end
+    # also clear: a body that leaves the constraint, and still does at the end
     clear = contact | (left > 0) | (rises & (gap >= -tiny))
     clear[hit] = True
     return bool(np.all(clear))

@@ -61,7 +61,7 @@ class Flown(NamedTuple):
                 # the piece ends at the event, beyond which nothing was checked
                 end, slope, i = curve[0][-1, -1], curve[1][-1, -1], count - 2
                 h = float(times[i + 1] - times[i])
-                # tolerance of the interpolant at an event
+                # diffrax locates the event only to within the error of its interpolant
                 if slope < 0 and end <= -slope * 1e-2 * h + 10 * tiny:
                     event = self._locate(k, i, 0.0, None, h)
             if event is not None:
@@ -71,9 +71,13 @@ class Flown(NamedTuple):
         return min(found, key=lambda e: times[e.row] + e.length, default=None)
 
     def _crossing(self, k, curve, before, slope, tiny):
-        """Return where a level first falls below zero, based on points in the steps."""
+        """Return the first event at which the level of constraint `k` falls below zero;
+        `TOO_LONG` if the event is too close to a start on the surface, and `None` if
+        there is no event.
+        """
         if before <= tiny:
-            # the motion leaves the surface, so a negative rate is due to rounding
+            # the motion starts on the surface and leaves it, so a negative rate is a
+            # rounding error
             slope = max(slope, 0.0)
         started_on_surface = before <= tiny
         for i, (levels, rates) in enumerate(zip(*curve, strict=True)):
@@ -127,5 +131,5 @@ class Flown(NamedTuple):
         return high
 
     def probe(self, i, h):
-        """Return state, levels and rates a step of length `h` (s) after point `i`."""
+        """Return the state, levels and rates at a time `h` (s) after point `i`."""
         return self.motion.probe(self.times[i], self.states[i], self.contact, h)

@@ -36,15 +36,15 @@ from ._one_step import one_step, scaled_term
 from ._points import ChatterEnd, Hop, PathPoint
 
 
-# attempted steps in one call of diffrax
+# maximum number of attempted steps in one call of diffrax
 _BATCH = 64
-# points at which each of its steps is checked
+# points within each of these steps at which events are sought, as fractions of the step
 FRACTIONS = np.arange(1, 9) / 8
 
 
 def _compiled(method):
-    """Compile a method only once: numbers are passed as arrays, which are not part of
-    the program.
+    """Compile a method only once: numbers are passed as arrays, whose values are not
+    part of the program.
     """
     compiled = program(method)
 
@@ -79,8 +79,9 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def fly(self, t0, x, contact, t1, first, longest):
-        """Return steps up to an event, `t1` or the end of the batch, and their
-        number.
+        """Return the times and states of the steps up to an event, `t1` or the maximum
+        number of attempts; the number of points; the number of attempts; and whether an
+        event has occurred.
         """
 
         def lowest(t, y, args, **kwargs):
@@ -127,7 +128,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def probe(self, t, x, contact, h) -> PathPoint:
-        """Return the point one step of length `h` after `(t, x)`."""
+        """Return the point that is reached by one step of length `h` from `(t, x)`."""
         return self._point(t, x, contact, h)
 
     @_compiled
@@ -150,8 +151,8 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def hop(self, t, x, contact, h) -> Hop:
-        """Return the end of a short flight, with the height from Gauss quadrature of
-        the velocity.
+        """Return the end of a short flight, and the change in height from Gauss
+        quadrature of the normal velocity.
         """
         nodes, weights = np.polynomial.legendre.leggauss(5)
 
@@ -189,8 +190,8 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def start_room(self, t, x):
-        """Return the gaps and normal velocities up to which a start is in contact, `(2,
-        m)`.
+        """Return the gaps and normal velocities up to which a start counts as contact,
+        `(2, m)`.
         """
         acceleration, time = normal_acceleration(self.system, t, x), self.system.period
         each = zip((gap_rounding, speed_rounding), (2, 1), strict=True)
@@ -201,7 +202,7 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def extents(self, t, x):
-        """Return the origins of the components, and their first scales, each `(n,)`."""
+        """Return the origins and the initial scales of the components, each `(n,)`."""
         gradient = jax.jacfwd(lambda y: gaps(self.system, t, y))(x)
         lifts = gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
         jets = [Jet(*row) for row in jnp.stack(self._free_series(3)(t, x), axis=1)]
@@ -216,7 +217,9 @@ class CompiledMotion(eqx.Module):
 
     @_compiled
     def slopes(self, t, x, contact):
-        """Return the sizes of the derivatives of the rates by the state, `(n, n)`."""
+        """Return the magnitudes of the derivatives of the rates with respect to the
+        state, `(n, n)`.
+        """
         return jnp.abs(jax.jacfwd(lambda y: self._field(t, y, contact))(x))
 
     @_compiled
@@ -243,7 +246,7 @@ class CompiledMotion(eqx.Module):
         held = contact.at[k].set(True)
 
         def pressing(s, y):
-            # acceleration along the motion allowed by the other contacts
+            # normal acceleration in the motion that the other contacts allow
             return lie_derivative(
                 lambda r, z: normal_velocity(self.system, r, z)[k],
                 lambda r, z: self._field(r, z, contact),

@@ -1,6 +1,6 @@
 """Second engine: one `diffrax.diffeqsolve` call for each piece of motion.
 
-A piece is flight or contact, up to the next event. The engine is written in plain
+A piece is a flight or a contact, up to the next event. The engine is written in plain
 Python around a few compiled functions. It is slower than the loop but easier to follow,
 and it supports implicit solvers. It also serves as a check of the loop, with which it
 shares only the derivatives of the gap, the formula for the duration of chatter, and the
@@ -25,7 +25,7 @@ from ._events import Flown, TOO_LONG
 from ._motion import CompiledMotion
 
 
-# a flight with lambda = v |j| / a^2 below this is one step instead of a diffrax call
+# a flight with lambda = v |j| / a^2 below this takes one step instead of a diffrax call
 _SHORT = 1e-3
 # this many consecutive impacts, each while another gap is zero to within rounding,
 # count as a joint accumulation
@@ -62,7 +62,7 @@ def simulate_segments(
 
 
 class _Engine:
-    """The state of a run; `contact` tells whether each constraint is in contact."""
+    """The state of a run; `contact` contains a flag for each constraint."""
 
     def __init__(self, system, settings, t0, state, t1):
         self.settings = settings
@@ -86,7 +86,7 @@ class _Engine:
         # the first step of the next piece, shortened if it is too long
         self.first = np.inf
         self.fastest = 0.0
-        # constraint released at this instant: its gap and velocity grow from zero
+        # the constraint released at this instant, whose gap and velocity grow from zero
         self.released: int | None = None
         # consecutive impacts while another gap was closed to within rounding, but not
         # in contact
@@ -134,7 +134,7 @@ class _Engine:
         return Log(*head, *map(jnp.asarray, columns[3:]))
 
     def _fly(self, jets, level, rate):
-        """Integrate to the next event, or to the end of one diffrax call."""
+        """Integrate with one diffrax call, up to the next event if it is reached."""
         first = min(self.first, self.longest / 16)
         self._rescale(first)
         for k, jet in enumerate(jets):
@@ -185,9 +185,9 @@ class _Engine:
 
     def _hop(self, jets) -> bool:
         """Compute the next flight if it is too low to rise above rounding, and return
-        whether it is.
+        whether that was done.
 
-        Its height is taken from the integral of the normal velocity, not from the gap.
+        The height of the flight follows from the integral of the normal velocity.
         """
         if not self.rows or self.rows[-1][0] != RowKind.IMPACT:
             return False
@@ -215,7 +215,7 @@ class _Engine:
         return True
 
     def _impact(self, k, t, before):
-        """Apply the impact law; complete the chatter if it is due."""
+        """Apply the impact law, and complete the chatter if its conditions are met."""
         several, after = self._after_impact(k, t, before)
         speeds = [np.asarray(self.motion.velocity(t, x)) for x in (before, after)]
         self.fastest = max(self.fastest, float(speeds[1][k]))
@@ -242,7 +242,7 @@ class _Engine:
         self._row(RowKind.IMPACT, k, t, after, before)
 
     def _after_impact(self, k, t, before):
-        """Return whether several constraints are hit at once, and the state after."""
+        """Return whether several constraints are hit, and the state after impact."""
         if may_hit_together(self.motion.system, len(before), len(self.contact)):
             gaps = np.asarray(self.motion.jets(t, before))[:, 0]
             speeds = np.asarray(self.motion.velocity(t, before))
@@ -264,7 +264,7 @@ class _Engine:
         self._row(RowKind.CONTACT, k, self.t, self.x)
 
     def _no_step(self) -> float:
-        """Return the reason why no step is short enough."""
+        """Return the result code of a run in which no step is short enough."""
         return TOGETHER if self.crowded else STEP_FAILED
 
     def _release(self, k, t, x):
@@ -282,7 +282,7 @@ class _Engine:
         self.rows.append((kind, k, float(t), before, after, self.contact))
 
     def _look_ahead(self, time):
-        """Continue from just after a `time` (s) to just before the next breakpoint."""
+        """Limit the next pieces to times between `time` (s) and the next breakpoint."""
         self.ahead, self.end = np.inf, self.t1
         if self.breaks:
             ahead = breakpoints.next_breakpoint(self.breaks, self.repeat, time)
@@ -292,7 +292,7 @@ class _Engine:
                 self.end = float(breakpoints.before(self.ahead, self.span))
 
     def _pass_breakpoint(self):
-        """Continue on the far side of a breakpoint; its log row records the time."""
+        """Continue on the far side of a breakpoint, and log its exact time."""
         last, here, time = self.rows[-1] if self.rows else None, self.t, self.ahead
         self.x = self.x + (time - here) * self._rates()
         if last is not None and last[0] == RowKind.STEP and last[2] == here:
@@ -336,7 +336,7 @@ class _Engine:
         self.motion = self.motion.measured(scale)
 
     def _tiny(self, states):
-        """Return the resolution of each gap, limited by rounding, along some states."""
+        """Return the resolution of each gap, limited by rounding, for these states."""
         reach = np.abs(states).max(axis=0) + self.extents
         return 500 * np.asarray(self.motion.rounding(self.t, self.x, reach))[0]
 

@@ -1,4 +1,4 @@
-"""What the compiled functions of `_motion.py` return."""
+"""Results of the compiled functions of `_motion.py`."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ class PathPoint(NamedTuple):
     """An intermediate state, and for each constraint the distance from its event.
 
     The level is the gap of an open constraint, and the pressure (minus the multiplier)
-    of a constraint in contact; the event is the point at which it falls through zero.
+    of a constraint in contact; at the event, the level falls through zero.
     """
 
     state: jax.Array
@@ -18,8 +18,8 @@ class PathPoint(NamedTuple):
 
 
 class Hop(NamedTuple):
-    """End of a short flight: a `PathPoint`, normal velocity, change in height, and
-    error.
+    """End of a short flight: a `PathPoint`, the normal velocities, the changes in
+    height, and the error relative to the allowed error.
     """
 
     state: jax.Array

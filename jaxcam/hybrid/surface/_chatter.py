@@ -1,4 +1,4 @@
-"""Complete a chatter sequence by a formula.
+"""Complete a chatter sequence by a formula for its remaining duration.
 
 After an impact with small rebound speed u the normal motion is y'' = A + B t + C y',
 where A < 0 is the normal acceleration of the state without normal velocity, B its rate
@@ -178,7 +178,9 @@ def chatter_completion(
 
 
 def _softening(system, t, point, direction, speed, restitution):
-    """Return r1 of r0 + r1 v, from the impact that led to this rebound."""
+    """Return the slope r1 of the coefficient r0 + r1 v, from the impact before this
+    rebound.
+    """
     bounces = restitution > 0
     approach = speed / jnp.where(bounces, restitution, 1.0)
     after = impacts(system, t, point - approach * direction)[0]

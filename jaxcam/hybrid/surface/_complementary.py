@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 
-# an active set with a pivot below this, relative to one, is redundant
+# an active set with a pivot below this is redundant; the diagonal of the matrix is one
 _REDUNDANT = 1e-12
 
 
@@ -16,9 +16,9 @@ def complementary(
     """Return p >= 0 with right + matrix p >= 0, where one of the two is zero for each
     unknown.
 
-    The solution belongs to that of the 2^m active sets for which the smallest of these
-    numbers is largest, so that rounding does not exclude it. The loops are unrolled,
-    because a batch of such small problems then stays elementwise.
+    Of the 2^m active sets, the one is chosen for which the smallest of all these values
+    is largest, so that rounding errors do not exclude the solution. The loops are
+    unrolled, so that all operations on a batch of such problems are elementwise.
 
     **Arguments:**
 

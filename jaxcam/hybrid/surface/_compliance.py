@@ -22,14 +22,14 @@ from ._sliding import InMode
 from ._switches import OnSides
 
 
-# minors of at most this size are examined
+# only minors of up to this many rows are examined
 _LARGEST = 3
 # redundant contacts, whose minor is below this without friction, are not examined
 _REDUNDANT = 1e-9
 
 
 def least_compliance(mode: InMode, t, x) -> Float[Array, ""]:
-    """Return the smallest minor of the contacts, relative to that without friction.
+    """Return the smallest principal minor of c, relative to its value without friction.
 
     A body that sticks may slip to either side, so both are examined. Without a contact,
     the result is one.
@@ -73,7 +73,7 @@ def _least_minor(matrix, free, contact):
 
 
 def _minor(matrix, rows, columns):
-    """Return the determinant of some rows and columns, by expansion."""
+    """Return the determinant of the given rows and columns, by expansion."""
     if not rows:
         return jnp.ones(())
     total = jnp.zeros(())

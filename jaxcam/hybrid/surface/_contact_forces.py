@@ -38,7 +38,7 @@ class ContactForces(NamedTuple):
 
 
 def contact_terms(system: HybridSystem, t: RealScalar, x: State) -> ContactTerms:
-    """Return the terms of all contact forces at one state."""
+    """Return the terms that determine the contact forces at a state."""
     one = jnp.ones_like(t)
     _, drift = jax.jvp(lambda s: normal_velocity(system, s, x), (t,), (one,))
     gradient = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
@@ -52,7 +52,7 @@ def contact_forces(
     contact: Bool[Array, " m"],
     terms: ContactTerms | None = None,
 ) -> ContactForces:
-    """Return multipliers and field; `terms` that are given are not computed again."""
+    """Return the multipliers and the field; `terms` are computed unless given."""
     drift, gradient, pushes = contact_terms(system, t, x) if terms is None else terms
     free = system.vector_field(t, x)
     acceleration = drift + gradient @ free
@@ -122,12 +122,12 @@ def sticking_field(system: HybridSystem, t: RealScalar, x: State) -> State:
 
 
 class Distances(NamedTuple):
-    """The functions of time of which a step needs derivatives, in one mode."""
+    """The functions whose time derivatives a step needs, in one mode."""
 
     gaps: Float[Array, " m"]
     # multipliers of the contacts
     multipliers: Float[Array, " m"]
-    # distances of the switching surfaces, zero at a crossing or at the end of sliding
+    # distances from the switching surfaces, zero at a crossing or at the end of sliding
     surfaces: Float[Array, " k"]
     # whether a contact holds the motion at rest at the surface
     still: Bool[Array, " k"]

@@ -17,7 +17,7 @@ def has_friction(system: HybridSystem) -> bool:
 
 
 def sides_of(system: HybridSystem, t, x) -> Float[Array, " k"]:
-    """Return the sides of the motion, +1 or -1."""
+    """Return the sides of the surfaces on which the motion is, +1 or -1."""
     if isinstance(system, OnSides):
         return system.signs
     assert isinstance(system, SwitchedSystem)
@@ -44,10 +44,10 @@ def friction_on(
 
 
 def restitution_kind(system: HybridSystem) -> str:
-    """Return the hypothesis of restitution of a system with friction."""
+    """Return the restitution hypothesis of a system with friction."""
     return _whole(system).restitution_kind
 
 
 def _whole(system: HybridSystem) -> Any:
-    """Return the system of which this may be one branch."""
+    """Return the system, or the switched system of which it is a branch (`OnSides`)."""
     return system.system if isinstance(system, OnSides) else system

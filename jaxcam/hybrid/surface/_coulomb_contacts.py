@@ -21,7 +21,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 
 _SLIPS_BACK, _STICKS = 2, 3
-# violations of a condition below this, relative to the velocities, are rounding
+# violations of a condition below this, relative to the velocities, are rounding errors
 _ROUNDING = 1e-10
 
 
@@ -82,9 +82,10 @@ def contact_impulses(
 
 
 def _states(index, number: int, given) -> Int[Array, " m"]:
-    """Return the state of each contact: 0 is open, 1 slips in the positive direction.
+    """Return the state of each contact in the combination with this index: 0 is open, 1
+    slips in the positive direction, 2 in the negative direction, and 3 sticks.
 
-    With `given` normal impulses, none is open.
+    If the normal impulses are `given`, no contact is open.
     """
     places = jnp.arange(number)
     if given is None:
@@ -93,7 +94,7 @@ def _states(index, number: int, given) -> Int[Array, " m"]:
 
 
 def _solved(matrix, velocities, given, codes):
-    """Return the impulses for these contact states, and the velocities after them."""
+    """Return the impulses for these contact states, and the velocities that result."""
     number = len(codes)
     back, sticks = codes == _SLIPS_BACK, codes == _STICKS
     transfer = matrix[:, :number]
@@ -104,7 +105,8 @@ def _solved(matrix, velocities, given, codes):
         start, fixed = velocities + normal @ given, given
         presses = jnp.zeros(number, dtype=bool)
     whole = jnp.concatenate([transfer, normal], axis=1)
-    # friction first: its part of the matrix always has positive pivots
+    # friction is eliminated first, because its part of the matrix always has positive
+    # pivots
     found = _eliminated(whole, -start, jnp.concatenate([sticks, presses]))
     total = found[number:] + fixed
     negative = found[:number] + jnp.where(back, total, 0.0)
@@ -112,9 +114,9 @@ def _solved(matrix, velocities, given, codes):
 
 
 def _eliminated(matrix, right, mask):
-    """Solve for the masked unknowns, zero elsewhere, by Gauss-Jordan elimination.
+    """Return the solution for the masked unknowns, zero elsewhere.
 
-    Its operations are on entire rows, so that it compiles fast.
+    Gauss-Jordan elimination compiles fast, because it operates on entire rows.
     """
     number = len(right)
     rows = jnp.where(mask[:, None] & mask[None, :], matrix, jnp.eye(number))
@@ -127,7 +129,7 @@ def _eliminated(matrix, right, mask):
 
 
 def _least(impulses, after, codes, closed, given):
-    """Return by how much the least satisfied condition is satisfied."""
+    """Return the smallest margin of all conditions, negative if one is violated."""
     number = len(codes)
     slips, normals = after[:number], after[number:]
     negative, total = impulses[:number], impulses[number:]

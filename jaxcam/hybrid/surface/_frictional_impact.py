@@ -28,7 +28,7 @@ class Rates(NamedTuple):
 class Impulses(NamedTuple):
     """The normal impulse, and its parts during positive and negative slip.
 
-    While the slip remains zero, the friction is a mixture of both.
+    While the slip remains zero, the normal impulse is divided between these two parts.
     """
 
     total: Any
@@ -41,7 +41,7 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
 
     **Arguments:**
 
-    - `side` (+1 or -1) of the slip, and its size `slip` >= 0.
+    - `side` (+1 or -1): sign of the slip velocity, whose magnitude is `slip`.
     - `approach`: normal velocity before the impact, negative.
     - `restitution`: the coefficient of restitution.
     - `kind`: `"kinematic"` (Newton), `"kinetic"` (Poisson), `"energetic"` (Stronge) or
@@ -53,7 +53,7 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
     if kind == "complementarity":
         return _by_final_slip(side * slip, -(1 + restitution) * approach, rates)
     before = _of_side(side > 0, rates)
-    # rate at which the slip decreases, and impulse at which it ends
+    # rate at which the slip decreases, and normal impulse at which it ends
     closing = -side * before[0]
     slows = closing > 0
     first = jnp.where(slows, slip / jnp.where(slows, closing, 1.0), jnp.inf)
@@ -74,15 +74,15 @@ def impulses(side, slip, approach, restitution, rates: Rates, kind: str) -> Impu
 
 def _by_final_slip(slip, change, rates: Rates) -> Impulses:
     """Return the impulses that change the normal velocity by `change`, with friction
-    opposite to the slip after them.
+    that opposes the slip after the impact.
     """
     (s1, v1), (s2, v2) = rates
-    # in the range of Painleve, a normal impulse may not push the body away
+    # in a Painleve configuration, a normal impulse may not push the body away
     ahead = change / jnp.where(v1 > 0, v1, 1.0)
     behind = change / jnp.where(v2 > 0, v2, 1.0)
     forward = (v1 > 0) & (slip + s1 * ahead >= 0)
     backward = (v2 > 0) & (slip + s2 * behind <= 0)
-    # if the contact sticks, both velocities after the impact are given
+    # if the contact sticks, both velocities after the impact are known
     sticks = ~(forward | backward)
     both = jnp.where(sticks, s2 * v1 - s1 * v2, 1.0)
     held = jnp.where(sticks, slip, 0.0)
@@ -98,7 +98,11 @@ def _of_side(positive, rates: Rates):
 
 
 def _reaching(velocity, approach, first, slope, later):
-    """Return the impulse at which the normal velocity reaches a value."""
+    """Return the normal impulse at which the normal velocity reaches a given value.
+
+    Per unit of impulse, the velocity increases by `slope` until the slip ends at the
+    impulse `first`, and by `later` after that.
+    """
     change = velocity - approach
     # the first slope may be negative: then only the second phase ends the approach
     early = jnp.where(slope > 0, change / jnp.where(slope > 0, slope, 1.0), jnp.inf)
@@ -123,14 +127,14 @@ def _energetic(approach, restitution, first, slope, later):
     stopped = _reaching(0.0 * approach, approach, first, slope, later)
     bounded = jnp.isfinite(first)
     reached = jnp.where(bounded, first, 0.0)
-    # does the first phase last beyond compression?
+    # whether the first phase, until the slip ends, lasts beyond compression
     lasts = first >= stopped
     rate = jnp.where(lasts, slope, 1.0)
     between = approach + slope * reached
     # twice the work in compression, and twice the work wanted in restitution
     two = between**2 / later - (approach + between) * reached
     wanted = restitution**2 * jnp.where(lasts, approach**2 / rate, two)
-    # in restitution, the first phase adds this impulse, at most
+    # largest impulse that the first phase can add in restitution
     ahead = jnp.where(lasts & bounded, reached - stopped, 0.0)
     most = rate * ahead**2
     alone = lasts & (~bounded | (wanted <= most))

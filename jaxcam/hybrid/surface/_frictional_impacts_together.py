@@ -53,7 +53,7 @@ def frictional_impacts_together(
 
 
 def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bool):
-    """Return the impulses of all contacts, as those of `contact_impulses`.
+    """Return the impulses of all contacts, defined as in `contact_impulses`.
 
     **Arguments:**
 
@@ -77,7 +77,7 @@ def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bo
     else:
         normal = coefficients * pressed[number:]
         back = contact_impulses(matrix, between, closed, sizes, normal)
-    # the energy is that of friction and normal impulses
+    # to compute the energy, impulses of friction and normal impulses are separated
     along = jnp.concatenate([along, jnp.zeros_like(before)])
     down, up = (part + along * jnp.tile(part[number:], 2) for part in (pressed, back))
     bounds = restitution_bound(apart, velocities, down, up, jnp.ones(2 * number))
@@ -87,8 +87,8 @@ def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bo
 
 
 def _largest(velocities, closed):
-    """Return the largest size of the velocities at closed contacts, or one if they are
-    all zero; without derivatives.
+    """Return the largest magnitude of the velocities at closed contacts, or one if all
+    are zero; the result has no derivatives.
     """
     sizes = jax.lax.stop_gradient(jnp.abs(velocities))
     found = jnp.max(jnp.where(closed, sizes, 0.0))
@@ -96,11 +96,12 @@ def _largest(velocities, closed):
 
 
 class _Rubbing(NamedTuple):
-    """The slip velocities, their derivatives by the state, the friction during positive
-    slip, and the change of friction from positive to negative slip, of each contact.
+    """For each contact: the slip velocity, its derivatives with respect to the state,
+    the friction during positive slip, and the change of friction from positive to
+    negative slip.
 
-    A slip velocity is given in units of its change due to that change of friction;
-    without friction, it is zero.
+    The slip velocity is scaled so that this change of friction changes it by one; it is
+    zero for a contact without friction.
     """
 
     slips: Float[Array, " m"]

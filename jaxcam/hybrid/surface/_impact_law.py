@@ -11,9 +11,9 @@ from ._normal import gaps, normal_velocity
 from ._rounding import speed_rounding
 
 
-# rounding error of a law that is evaluated in several coordinates
+# tolerated rounding error of an impact law that is evaluated in several coordinates
 _ROUNDING = 1e-6
-# at this multiple of its rounding error, a normal velocity gives the law accurately
+# a normal velocity of this multiple of its rounding error gives accurate coefficients
 _KNOWN = 1e7
 # Newton steps from the state to the constraint
 _STEPS = 4

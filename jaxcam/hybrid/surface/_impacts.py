@@ -70,8 +70,8 @@ def frictionless_law(system: HybridSystem, t: RealScalar, x: State) -> Frictionl
         x: State just before an impact, shape `(n,)`.
 
     Returns:
-        The law; for a constraint that is not approached, to within rounding, direction
-            and coefficient are the limits of slow impacts.
+        The law; for a constraint that is not approached, to within rounding, the
+            direction and the coefficient are those in the limit of slow impacts.
     """
     after = jnp.atleast_2d(system.impact(t, x))
     before = normal_velocity(system, t, x)
@@ -117,8 +117,8 @@ def restitution_coefficients(system, t, x) -> Float[Array, " m"]:
 def _with_friction(
     system: HybridSystem, t: RealScalar, x: State, after: Float[Array, "m n"]
 ) -> Float[Array, "m n"]:
-    """Add the impulses of friction to frictionless impacts, and change the normal
-    impulses accordingly.
+    """Return the states after impacts with friction, from those `after` frictionless
+    impacts.
     """
     sides, kind = sides_of(system, t, x), restitution_kind(system)
     before = normal_velocity(system, t, x)
@@ -135,9 +135,10 @@ def _with_friction(
 
 
 def _law(system, t, x, before, after, slow):
-    """Return the directions and coefficients that frictionless impacts give.
+    """Return the directions and coefficients of frictionless impacts.
 
-    Up to the approach velocities `slow`, they are the limits of slow impacts.
+    At approach velocities up to `slow`, those in the limit of slow impacts are returned
+    instead.
     """
     limits = normal_directions(system, t, x)
     directions, coefficients = [], []
@@ -157,7 +158,7 @@ def _law(system, t, x, before, after, slow):
 
 
 def _slow_coefficient(system, t, x, k: int, direction):
-    """Return the limit of the coefficient of restitution without friction."""
+    """Return the frictionless coefficient in the limit of slow impacts."""
 
     def frictionless(y):
         return normal_velocity(system, t, jnp.atleast_2d(system.impact(t, y))[k])[k]
@@ -166,8 +167,8 @@ def _slow_coefficient(system, t, x, k: int, direction):
 
 
 class Contact(NamedTuple):
-    """The slip at one contact: its side and size, and its switching function; and the
-    friction during positive and negative slip `(n,)`.
+    """The slip at one contact: its sign, magnitude and switching function (an index);
+    the friction during positive and negative slip, `(n,)`; and the `Rates`.
     """
 
     side: Any
@@ -184,7 +185,7 @@ def contact_at(system, t, x, k: int, sides, direction) -> Contact:
     The slip is the switching function on which the friction depends.
     """
     same = friction_on(system, t, x, sides)[k]
-    # without such a function, the friction never changes
+    # if the friction depends on no switching function, the slip never ends
     found: tuple = jnp.asarray(1.0), jnp.asarray(jnp.inf), same, same
     place = jnp.asarray(0)
     for j in reversed(range(len(sides))):

@@ -30,8 +30,8 @@ from ._impacts import frictionless_law
 from ._restitution_bound import restitution_bound
 
 
-# more constraints than this are hit one after the other, because there are 2^m active
-# sets, or 4^m with friction
+# largest number of constraints of a system with simultaneous impacts: there are 2^m
+# active sets, or 4^m with friction; with more constraints, impacts occur one by one
 MOST_TOGETHER = 4
 MOST_WITH_FRICTION = 3
 
@@ -51,7 +51,7 @@ def may_hit_together(system: HybridSystem, states: int, number: int) -> bool:
 def impacts_together(
     system: HybridSystem, t: RealScalar, x: State, closed: Bool[Array, " m"]
 ) -> State:
-    """Return the state after an impact at all `closed` constraints that approach.
+    """Return the state after an impact at all `closed` constraints that are approached.
 
     Args:
         system: The system.

@@ -19,7 +19,7 @@ from ._normal import (
 SHORT_FLIGHT = 1e-8
 # Normal velocities below this fraction of the fastest rebound are negligible
 SLOW_REBOUND = 1e-13
-# Largest ratio of the normal velocities at an impact that loses energy
+# An impact loses energy if the ratio of rebound to approach velocity is below this
 LOSSY_RATIO = 1 - 1e-9
 
 

@@ -39,8 +39,8 @@ def gaps(system: HybridSystem, t: RealScalar, x: State) -> Float[Array, " m"]:
 
 
 def lie_derivative(function: Callable, field: Callable) -> Callable:
-    """Return the rate of change of `function(t, x)` along `field`, including explicit
-    time.
+    """Return the rate of change of `function(t, x)` along `field`, including that due
+    to the explicit dependence on time.
     """
 
     def derivative(t, x):
@@ -156,8 +156,9 @@ def normal_acceleration(system, t, x) -> Float[Array, " m"]:
 def normal_directions(system, t, x) -> Float[Array, "m n"]:
     """Return the unit direction D of the impulse for each constraint.
 
-    The result is exact if the normal velocity is zero: R(x) - x = W v vanishes with v,
-    so W follows from the derivative of R(x) - x along the gradient of v.
+    The result is exact if the normal velocity v is zero: an impact changes the state by
+    W v, which vanishes with v, so W follows from the derivative of this change along
+    the gradient of v.
 
     Args:
         system: The system.
@@ -180,7 +181,7 @@ def normal_directions(system, t, x) -> Float[Array, "m n"]:
 
 
 def unit_directions(system, t, x, gradient: Float[Array, "m n"]):
-    """Return the directions D for the gradient of the normal velocities."""
+    """Return the directions D, given the gradients of the normal velocities."""
     number = gradient.shape[0]
     if not number:
         return gradient

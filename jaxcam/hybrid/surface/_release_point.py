@@ -1,4 +1,4 @@
-"""Find the release from sticking, the start of a period with complete chatter."""
+"""Find the release from sticking, at which a period with complete chatter starts."""
 
 import equinox as eqx
 import jax
@@ -73,7 +73,7 @@ def contact_acceleration(system: HybridSystem, times, guess) -> Float[Array, " t
 
 
 def _contact(system: HybridSystem, times, guess):
-    """Return states and accelerations of contact: twelve Newton steps at each time."""
+    """Return the states and accelerations in contact, by twelve Newton steps each."""
 
     def one(t):
         x = jax.lax.fori_loop(0, 12, lambda _, x: _onto(system, t, x), guess)

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 
-# products of coefficients of influence below this are rounding
+# products of coefficients of influence below this are rounding errors
 _UNCOUPLED = 1e-24
 
 
@@ -15,8 +15,8 @@ def restitution_bound(
     back: Float[Array, " k"],
     coefficients: Float[Array, " k"],
 ) -> Float[Array, " k"]:
-    """Return the factor, up to one, by which the energy limits each impulse of
-    restitution.
+    """Return the factor, at most one, by which each impulse of restitution must be
+    multiplied so that it does not return too much energy.
 
     Impulses that influence each other may together return the energy that they lost in
     compression, times the square of their largest coefficient of restitution.
@@ -38,7 +38,7 @@ def restitution_bound(
     inside = linear * linear + 4 * square * most
     root = jnp.sqrt(jnp.where(exceeds & (inside > 0), inside, 1.0))
     root = jnp.where(inside > 0, root, 0.0)
-    # the share of the impulses at which the energy reaches its bound, without
+    # the share of the impulses at which the energy reaches its bound, computed without
     # cancellation
     rises = exceeds & (linear > 0)
     share = jnp.where(
@@ -52,10 +52,10 @@ def restitution_bound(
 def _inverse_mass_ratios(
     matrix: Float[Array, "k k"],
 ) -> tuple[Float[Array, "k k"], Bool[Array, "k k"]]:
-    """Return the ratios of the inverse masses of the impulses, zero between those that
-    do not influence each other; and which impulses do, even if only through others.
+    """Return the ratios of the inverse masses of the impulses, zero for pairs that do
+    not influence each other; and which pairs do, even if only through other impulses.
 
-    The matrix is symmetric except for these masses: G_ab / m_a = G_ba / m_b.
+    With the inverse masses m, the matrix G satisfies G_ab / m_a = G_ba / m_b.
     """
     number = len(matrix)
     itself = jnp.eye(number, dtype=bool)

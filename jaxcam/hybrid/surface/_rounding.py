@@ -47,7 +47,7 @@ def forced_time(period):
 def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
     """Return the gaps of a start plus `room` times their resolution.
 
-    A start penetrates no constraint if none of them is negative.
+    A start penetrates no constraint if none of these sums is negative.
     """
     rounding = gap_rounding(system, t, x, jnp.abs(x))
     acceleration = normal_acceleration(system, t, x)
@@ -56,7 +56,7 @@ def least_gaps(system, t, x, room: RealScalar = 1.0) -> Float[Array, " m"]:
 
 
 def rounding_of(function: Callable, t, x, reach):
-    """Return how far rounding of `t` and `x` moves a function.
+    """Return the error of a function that is due to the rounding of `t` and `x`.
 
     State components are accurate to a few parts in 1e15; a time, and a phase computed
     from it, to two parts in 1e16 each.

@@ -4,18 +4,18 @@ While a motion slides on surfaces, its field is
 
     F = F_0 + sum_k b_k (F_k - F_0),
 
-where F_0 is the branch on the sides from which it came and F_k the branch beyond
-surface k, with weights b such that the switching functions of all these surfaces stay
-zero. On one surface, this is Filippov's convex combination. On several, it is exact if
-the effects of the sides are additive, as those of several dry-friction forces are. (A.
-F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988, section 4;
-R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
-2004, chapter 4)
+where F_0 is the branch on the sides from which the motion came, and F_k the branch
+beyond surface k, with weights b such that the switching functions of all these surfaces
+stay zero. On one surface, this is Filippov's convex combination. On several, it is
+exact if the effects of the sides are additive, as those of several dry-friction forces
+are. (A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988,
+section 4; R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+Systems, 2004, chapter 4)
 
-The distance of a surface is its switching function on the side of the motion, plus its
-hysteresis. It is positive before a crossing and zero at it, like a gap. While the
+The distance from a surface is its switching function on the side of the motion, plus
+its hysteresis. Like a gap, it is positive before and zero at a crossing. While the
 motion slides, the distance is (b + s) (1 + s - b) instead, with s = (holding - 1) / 2:
-sliding ends where it falls to zero.
+sliding ends where this expression falls to zero.
 """
 
 from typing import NamedTuple
@@ -44,9 +44,9 @@ class Jumps(NamedTuple):
     """
 
     held: tuple[tuple[int, ...], ...] = ()
-    """In contact: by the branch and by friction."""
+    """Components that change in contact, because of the branch or of friction."""
     free: tuple[tuple[int, ...], ...] = ()
-    """Without contacts: by the branch."""
+    """Components that change without contacts, because of the branch."""
 
 
 class InMode(OnSides):
@@ -98,7 +98,7 @@ class SlideTerms(NamedTuple):
     gains: Float[Array, "K K"]
     # whether the sides drive a motion that leaves the surface back to it
     firm: Bool[Array, " K"]
-    # whether a contact holds the motion at rest there, whatever the sides
+    # whether a contact holds the motion at rest there, whatever the sides are
     still: Bool[Array, " K"]
     # the field on the side from which the motion came
     field: Float[Array, " n"]
@@ -154,7 +154,7 @@ def slide_terms(mode: InMode, t, x) -> SlideTerms:
 
 
 def _own(gains: Float[Array, "K K"]) -> Float[Array, " K"]:
-    """Return the diagonal."""
+    """Return the diagonal: the effect of each side on the slope of its own surface."""
     return jnp.stack([gains[k, k] for k in range(len(gains))])
 
 
@@ -216,7 +216,7 @@ def _combined(mode: InMode, terms: SlideTerms) -> State:
     """Return the field of the branch plus its weighted changes beyond the surfaces."""
     parts, found = list(terms.field), shares(mode, terms)
     for kick, share, k in zip(terms.kicks, found, mode.slidable, strict=True):
-        # contact forces pass a change on to other components
+        # through contact forces, a change may affect other components
         changed = range(len(parts)) if mode.contact.shape[0] else mode.jumps[k]
         for i in changed:
             more = jnp.where(mode.sliding[k], share * kick[i], 0.0)
@@ -229,7 +229,7 @@ def _slides_on(mode: InMode):
 
 
 def _of_each(value, mode: OnSides) -> Float[Array, " k"]:
-    """Return a value of a system, repeated for each surface if it is one number."""
+    """Return one value for each surface, from a single number or a vector."""
     return jnp.broadcast_to(jnp.asarray(value, dtype=jnp.float64), mode.negative.shape)
 
 
@@ -239,8 +239,8 @@ def slack_of_hold(mode: OnSides) -> Float[Array, " k"]:
 
 
 def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
-    """Return the distance of each surface, zero at a crossing or at the end of sliding,
-    shape `(k,)`.
+    """Return the distance from each surface, zero at a crossing or at the end of
+    sliding, shape `(k,)`.
     """
     open_ones = mode.signs * surfaces(mode.system, t, x) + mode.system.hysteresis
     if not mode.slidable:
@@ -250,14 +250,14 @@ def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
     rows = [open_ones[k] for k in range(len(mode.jumps))]
     for i, k in enumerate(mode.slidable):
         left = (found[i] + slack[k]) * (1 + slack[k] - found[i])
-        # both branches drive the motion away from the surface
+        # -1 if both branches drive the motion away from the surface
         left = jnp.where(terms.firm[i], left, -1.0)
         rows[k] = jnp.where(mode.sliding[k], left, rows[k])
     return jnp.stack(rows)
 
 
 def open_surfaces(mode: InMode, t, x) -> tuple:
-    """Return the distance of each surface and its first three derivatives, `(k, 4)`,
+    """Return the distance from each surface and its first three derivatives, `(k, 4)`,
     and the rounding error of the distance, `(k,)`, for a motion that does not slide.
     """
     side = OnSides(mode.system, mode.negative)
@@ -331,7 +331,7 @@ def heights_rounded(mode: OnSides, t, x, reach: State) -> Float[Array, "2 k"]:
 
 
 def field_and_distances_in_mode(mode: InMode, t, x) -> tuple[State, Distances]:
-    """Return the field and the distances in this mode, those of the contacts first."""
+    """Return the field and the `Distances` in this mode."""
     multipliers, field = forces_in_mode(mode, t, x)
     still = [jnp.asarray(False) for _ in mode.jumps]
     if mode.slidable and mode.contact.shape[0]:
@@ -343,7 +343,7 @@ def field_and_distances_in_mode(mode: InMode, t, x) -> tuple[State, Distances]:
 
 
 def switched_rounding(mode: InMode, t, x, reach: State):
-    """Return the rounding errors of the gaps, then of the distances of surfaces."""
+    """Return the rounding errors of the gaps, then of the distances from surfaces."""
     own = rounding_of(lambda s, y: switching_distances(mode, s, y), t, x, reach)
     gaps = gap_rounding(mode, t, x, reach)
     return jnp.concatenate([gaps, own]) if gaps.shape[0] else own

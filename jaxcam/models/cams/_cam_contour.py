@@ -123,8 +123,8 @@ def flat_oscillating_contour(
 
         (point, arm), (rate, _) = jax.jvp(contact, (angle,), (jnp.ones_like(angle),))
         lift, slope, _ = _jet(profile, angle)
-        # seen from the cam, the face rotates at the rate slope - 1, and the contact
-        # point moves along the face in the sense opposite to this rotation
+        # in the frame of the cam, the face rotates at the rate slope - 1, and the
+        # contact point moves along the face in the sense opposite to this rotation
         along = rate[0] * jnp.cos(lift - angle) + rate[1] * jnp.sin(lift - angle)
         pressure = jnp.arctan(half_height / arm)
         return CamContour(point[0], point[1], along / (1 - slope), pressure, arm)

@@ -28,7 +28,7 @@ class EccentricCircle(CamProfile):
     """
 
     radius: jax.Array = parameter(0.045)
-    """Radius of the cam R (m)."""
+    """Radius of the cam, R (m)."""
     eccentricity: jax.Array = parameter(0.015)
     """Distance of the centre of the disc from the cam axis, e (m)."""
     center_x: jax.Array = parameter(0.249)
@@ -101,10 +101,12 @@ class EccentricCircle(CamProfile):
 
 @program
 def _series(circle: EccentricCircle):
-    """Return the mean, cosines and sines to keep, and the sum of the others (rad)."""
+    """Return the mean, the cosine and sine coefficients to keep, and the sum of the
+    amplitudes of the omitted harmonics (rad).
+    """
     keep = circle.harmonics
-    # four times the kept harmonics, so that the aliasing error is far smaller than the
-    # first omitted harmonic
+    # use four samples per kept harmonic, so that the aliasing error is far smaller than
+    # the first omitted harmonic
     points = max(64, 4 * keep)
     angles = 2 * np.pi * np.arange(points) / points
     spectrum = jnp.fft.rfft(circle(jnp.asarray(angles, dtype=float))) / points

@@ -50,10 +50,11 @@ class FourierProfile(CamProfile):
 def _sum(angle, mean, cosines, sines):
     # The waves follow from a recurrence, which is unrolled in Python so that it fuses
     # into plain arithmetic inside the loop of a simulation. The derivatives of a gap
-    # share the waves.
+    # use the same waves.
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     twice = 2 * cosine
-    # the mean is added last: it is the largest term, and adding to it rounds the others
+    # the mean is added last: it is the largest term, so adding the others to it one by
+    # one would round each of them
     total = cosines[0] * cosine + sines[0] * sine
     before, now = (jnp.ones_like(cosine), jnp.zeros_like(sine)), (cosine, sine)
     for k in range(1, cosines.shape[-1]):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class LawPiece(NamedTuple):
-    """`polynomial(u) + amplitude sin(frequency u + phase)` up to the fraction `end`."""
+    """A piece of a motion law: `polynomial(u) + amplitude sin(frequency u + phase)`."""
 
     end: float
     """Fraction u at which the piece ends."""

@@ -167,8 +167,8 @@ class MotionProgram(CamProfile):
 
 
 class MotionPieces(CamProfile):
-    """A program as pieces of polynomials and sines, created by
-    `MotionProgram.prepared`.
+    """A motion program as a table of pieces, each the sum of a polynomial and a sine,
+    created by `MotionProgram.prepared`.
     """
 
     starts: jax.Array = parameter()
@@ -198,8 +198,8 @@ class MotionPieces(CamProfile):
     def local(self, cam_angle):
         """Return the piece at an angle, and the fraction u of its segment."""
         angle = jnp.mod(cam_angle, _TURN)
-        # unrolled, because an inner loop would prevent fusion in the loop of a
-        # simulation
+        # the search is unrolled, because an inner loop could not be fused with the
+        # other operations in the loop of a simulation
         after = jnp.searchsorted(
             self.starts, angle, side="right", method="scan_unrolled"
         )
@@ -212,8 +212,8 @@ class MotionPieces(CamProfile):
         return jnp.concatenate([self.starts[1:], turn])
 
     def jet(self, piece, cam_angle) -> Float[Array, "... 4"]:
-        """Return the value and three derivatives of given pieces, continued to any
-        angle.
+        """Return the value and the first three derivatives of the given pieces,
+        continued to any angle.
 
         A joint has a value on each side; the choice of piece selects the side.
         """

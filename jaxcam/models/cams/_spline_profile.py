@@ -10,8 +10,8 @@ from ._profile import CamProfile
 
 _TURN = 2 * np.pi
 _FEWEST_POINTS = 6
-# Coefficients of a quintic c0 + c1 u + ... + c5 u^5, computed from its value, slope and
-# curvature at 0 and at 1
+# Matrix that maps the value, slope and curvature of a quintic c0 + c1 u + ... + c5 u^5
+# at 0 and at 1 to its coefficients
 _HERMITE = np.array(
     [
         [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -93,8 +93,8 @@ class PiecewiseProfile(CamProfile):
     def __call__(self, cam_angle) -> jax.Array:
         angle = jnp.mod(cam_angle - self.starts[0], _TURN)
         starts = self.starts - self.starts[0]
-        # unrolled, because an inner loop would prevent fusion in the loop of a
-        # simulation
+        # the search is unrolled, because an inner loop could not be fused with the
+        # other operations in the loop of a simulation
         after = jnp.searchsorted(starts, angle, side="right", method="scan_unrolled")
         piece = after - 1
         local = (angle - starts[piece]) / self.widths[piece]
@@ -118,13 +118,13 @@ def _quintic_pieces(widths, lifts):
     hermite = jnp.asarray(_HERMITE, dtype=widths.dtype)
     following = np.roll(np.arange(points), -1)
 
-    # from the value, h slope and h^2 curvature at both ends of a piece to the third and
-    # fourth derivatives at its start and at its end
+    # rows that map the value, h slope and h^2 curvature at both ends of a piece to its
+    # third and fourth derivatives, at its start and at its end
     third = 6 * hermite[3], 6 * hermite[3] + 24 * hermite[4] + 60 * hermite[5]
     fourth = 24 * hermite[4], 24 * hermite[4] + 120 * hermite[5]
     powers = jnp.stack([jnp.ones_like(h), h, h**2] * 2, axis=-1)
 
-    # the columns that belong to the points i, i + 1 and i + 2
+    # select the columns that belong to the points i, i + 1 and i + 2
     here = np.eye(points)
     after, second = np.roll(here, 1, axis=1), np.roll(here, 2, axis=1)
     rows = []

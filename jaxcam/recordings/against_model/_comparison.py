@@ -38,7 +38,7 @@ class Residuals:
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One mode of a comparison."""
+    """Summary of one mode and channel of a comparison."""
 
     mode: str
     """The mode."""
@@ -178,7 +178,9 @@ def _row(parts: list[Residuals]) -> Row:
 
 
 def _worst(parts: list[Residuals]) -> tuple[str, float, float, float]:
-    """Return the 10 ms interval with the most significant mean."""
+    """Return the recording, time, cam angle and significance of the 10 ms interval with
+    the most significant mean.
+    """
     best = ("", float("nan"), float("nan"), 0.0)
     for part in parts:
         scaled = part.value / part.stderr

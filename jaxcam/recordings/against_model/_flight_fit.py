@@ -61,7 +61,7 @@ def fit_flights(
     - `size`: number of components of the state.
     """
     flights, longest = len(times), max(len(time) for time in times)
-    # padded generously, so that recordings share a compiled program
+    # the arrays are padded generously, so that recordings share a compiled program
     rows, width = 48 * -(-flights // 48), 1024 * -(-longest // 1024)
     time = np.zeros((rows, width))
     values = np.zeros((rows, len(observe), width))
@@ -146,7 +146,7 @@ def _predict(system, picks, substeps, state, clock, time):
             t = clock + t0 + i * h
             return array_step(RK4, system.vector_field, t, x, h, unrolled=True)[0]
 
-        # unrolled if possible, because an inner loop costs more than the steps
+        # unrolled if there are few steps, because a loop would cost more than the steps
         x1 = x0
         if substeps <= 2:
             for i in range(substeps):
@@ -195,7 +195,9 @@ def _fit(system, picks, substeps, guess, clock, time, values, mask, noise):
 
 
 def _inverse(matrix):
-    """Invert a normal matrix; undetermined components have zero rows."""
+    """Return the inverse of a normal matrix, with zero rows for undetermined
+    components.
+    """
     scale = jnp.sqrt(jnp.maximum(jnp.diagonal(matrix), 1e-300))
     scales = jnp.outer(scale, scale)
     return jnp.linalg.pinv(matrix / scales, rtol=1e-12, hermitian=True) / scales
@@ -226,7 +228,8 @@ def size_of(system: HybridSystem, observe: Observe) -> int:
         return len(system.state_names)
     picks = [pick for pick in observe.values() if isinstance(pick, int)]
     for size in range(max(picks, default=0) + 1, 64):
-        # a vector field that unpacks its state accepts only one size
+        # a vector field that unpacks its state accepts only one size, which is found by
+        # trying
         try:
             shape = jax.eval_shape(
                 lambda state: system.vector_field(jnp.asarray(0.0), state),

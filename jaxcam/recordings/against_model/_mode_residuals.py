@@ -11,7 +11,8 @@ from ._comparison import Residuals
 from ._flight_fit import fit_flights, observed, rate_of, size_of, state_at
 
 
-# A shorter flight determines only its initial state
+# Minimum number of samples in a flight; a shorter flight determines only its initial
+# state and shows no residuals
 _LEAST_SAMPLES = 16
 
 
@@ -28,8 +29,8 @@ def _rows(segments: Segments, flight: Flight) -> np.ndarray:
 
 
 def in_flight(system, segments, observe, noise, clock):
-    """Return the residuals of each channel in flight, with fitted initial states, and
-    notes.
+    """Return the residuals of each channel in flight, after the initial states have
+    been fitted, and notes on omitted flights.
     """
     recording = segments.recording
     pieces = [(i, _rows(segments, f)) for i, f in enumerate(segments.flights)]
@@ -76,8 +77,8 @@ def in_flight(system, segments, observe, noise, clock):
                 np.concatenate(values),
                 np.full(len(every), sigma[column]),
                 piece,
-                # each channel loses its share of degrees of freedom to the initial
-                # states
+                # the fitted initial states use degrees of freedom, in equal shares from
+                # the channels
                 fitted=round(size * len(kept) / len(observe)),
             )
         )
@@ -85,7 +86,9 @@ def in_flight(system, segments, observe, noise, clock):
 
 
 def in_contact(system, segments, pick, clock) -> list[Residuals]:
-    """Return the channel in contact minus its value on the model's surface."""
+    """Return the residuals of the channel in contact: its samples minus its value on
+    the model's surface.
+    """
     time = segments.recording.time
     kept = [
         (i, np.flatnonzero((time >= part.settled) & (time < part.stop.time)))
@@ -172,12 +175,15 @@ def _distance(system, pick, clock, state) -> Float[np.ndarray, " k"]:
 
 @program
 def _off_surface(system, pick, clock, state):
-    """Return the gap in units of the channel, to first order, shape `(k,)`."""
+    """Return the gap, converted to the unit of the channel to first order, shape
+    `(k,)`.
+    """
 
     def one(clock, state):
         gap, slope = jax.value_and_grad(lambda x: _nearest(system, clock, x))(state)
         channel = jax.grad(lambda x: observed(pick, x))(state)
-        # derivative of the gap with respect to the channel, in the channel's direction
+        # the gap, divided by its derivative with respect to the channel along the
+        # channel's gradient
         return gap * jnp.sum(channel**2) / jnp.sum(slope * channel)
 
     return jax.vmap(one)(jnp.asarray(clock), jnp.asarray(state))
@@ -203,7 +209,8 @@ def _after_impact(system, pick, clock, state):
         def before(state):
             return rate_of(system, (pick,), clock, state)[0]
 
-        # in the direction of the state in which only the rate changes
+        # differentiate along the gradient of the rate, scaled so that the rate changes
+        # by one
         direction = jax.grad(before)(state)
         size = jnp.sum(direction**2)
         value, change = jax.jvp(after, (state,), (direction / size,))

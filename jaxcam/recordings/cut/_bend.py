@@ -20,8 +20,9 @@ WAVES = 2 * _HIGHEST + 1
 # Correlation lengths (rad) and sizes (in units of the noise) to try
 _LENGTHS = (0.1, 0.2, 0.4)
 _SIZES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-# Required gain of a bend in twice the log-likelihood: for the parameters of a straight
-# line and the number of samples, plus a term for its unknown position
+# Required gain of a bend in twice the log-likelihood: the penalty for the two
+# parameters of a straight line, given the number of samples in typical recordings, plus
+# an allowance for the unknown position of the bend
 _SURE = 30.0
 
 
@@ -44,7 +45,7 @@ def spread(length: float) -> Float[np.ndarray, " waves"]:
 
 
 class Seen(NamedTuple):
-    """Information of one recording on the coefficients of a surface, linearised.
+    """Linearised information of one recording on the coefficients of a surface.
 
     The normal equations have the matrix `normal`, shape `(p, p)`, and the right-hand
     side `target`, shape `(p,)`; the coefficients of a bend come last.
@@ -63,9 +64,10 @@ def bend_sizes(
     """Return the prior standard deviations of the coefficients of a bend; zero if no
     bend is significant.
 
-    **Arguments:** `records`: the information from each recording; `known`, `pull`: what
-    the tolerances of the `q` coefficients outside the bend add to the normal matrix and
-    to the right-hand side; `noise`: standard deviation of a sample.
+    **Arguments:** `records` is the information from each recording; `known` and `pull`
+    are the contributions of the tolerances of the `q` coefficients outside the bend to
+    the diagonal of the normal matrix and to the right-hand side; `noise` is the
+    standard deviation of a sample.
     """
     none = np.zeros(WAVES)
     if len(records) < 2:
@@ -100,7 +102,7 @@ def _foretold(records, known, pull, sizes) -> float:
     """Return the total gain in twice the log-likelihood if each recording is predicted
     with the bend fitted to all others.
 
-    The other coefficients are those fitted to all recordings.
+    The coefficients outside the bend are those fitted to all recordings.
     """
     count = len(known)
     normal, target = _total(records)

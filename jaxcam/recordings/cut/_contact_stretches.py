@@ -30,12 +30,12 @@ SHORTEST_FLIGHT = 5
 
 
 def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
-    """Return lasting stretches near the surface, including any low flights in them.
+    """Return the long stretches near the surface, including any low flights in them.
 
-    Also return stretches that may be slow impacts or grazing contacts.
+    A second list contains stretches that may be slow impacts or grazing contacts.
     """
     near = motion.gap < LOW * motion.noise
-    # one outlier in thousands of samples is not a flight
+    # a single outlier among thousands of samples is not a flight
     near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3]
     shortest = max(4, round(SHORTEST_CONTACT / motion.interval))
     long = [pair for pair in stretches(near) if pair[1] - pair[0] >= shortest]

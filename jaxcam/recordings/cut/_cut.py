@@ -23,11 +23,11 @@ from ._release import release_time
 from ._segments import Boundary, Contact, Flight, Impacts
 
 
-# Standard errors by which a motion must recede from a surface before a supposed impact
-# to reject the latter, or approach the surface after an impact to assume several
-# impacts
+# A supposed impact is rejected if the motion before it recedes from the surface by more
+# than this many standard errors of the velocity. If the motion after an impact
+# approaches the surface by more than this, several impacts are assumed
 _SURE = 3.0
-# Samples of a flight before an impact needed to determine its curvature
+# Minimum number of samples that determine the curvature of a flight before an impact
 _LONG = 10
 # Largest gap at an impact, in units of the noise and as a fraction of the largest gap;
 # this allows for a surface that is known only within its tolerance
@@ -108,7 +108,7 @@ def cut(
     ]
     contacts = settled_alike(contacts, flights)
     impacts = [
-        # an approach speed that is negative due to noise is unknown
+        # an impact is omitted if noise has made its approach speed negative
         ({**crossed[place], "side": marks.get(place, side.get(place, 0))}, number)
         for number, (_, place) in enumerate(spans)
         if place in crossed
@@ -122,7 +122,7 @@ def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
     """Return contacts, doubtful contacts and impacts, each with the index of its
     side.
     """
-    # gaps may have different units
+    # gaps may have different units, so they are compared in units of their noise
     nearest = np.argmin(np.stack([side.gap / side.noise for side in sides]), axis=0)
     resting: dict[Span, int] = {}
     doubtful: dict[Span, int] = {}
@@ -137,7 +137,8 @@ def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
                 marks[mark] = number
         resting |= dict.fromkeys(found, number)
         doubtful |= dict.fromkeys(unsure, number)
-    # long near-surface stretches without impacts count as contact
+    # doubtful stretches next to an impact or a contact are dropped; others count as
+    # contact
     doubtful = {
         pair: number
         for pair, number in doubtful.items()
@@ -172,7 +173,7 @@ def _spans(count: int, resting: list[Span], marks: list[int]) -> list[Span]:
 
 
 def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
-    """Estimate an impact from the flights on both sides, which meet at that time."""
+    """Estimate an impact from the flights on both sides, which meet at its time."""
     before = motion.fit(first, place, at_end=True)
     after = motion.fit(place, last, at_end=False)
     origin = float(motion.time[place] - motion.interval / 2)
@@ -182,7 +183,8 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
         time, stderr = origin, 2 * motion.interval
     surface = float(np.interp(time, motion.time, motion.rate))
     approach, separation = surface - before.slope(time), after.slope(time) - surface
-    # the fits meet at a weighted mean of both, relative to the surface
+    # where the fits meet, the distance from the surface is the mean of both fits with
+    # these weights
     shares = np.array([separation, approach])
     shares = shares / np.sum(shares) if np.sum(shares) > 0 else np.full(2, 0.5)
     errors = np.array([before.value_stderr(time), after.value_stderr(time)])
@@ -206,7 +208,7 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
 def _impact(found: dict) -> Boundary:
     if found["separation"] < -_SURE * found["after_stderr"]:
         evidence = "after a velocity jump, the motion still leads into the surface"
-        # the windows that show a jump are this long on either side
+        # the windows used to detect a jump extend this far on either side
         return Boundary(found["time"], WINDOW / 2, "several impacts", evidence)
     jump = abs(found["after"] - found["before"])
     error = np.hypot(found["before_stderr"], found["after_stderr"])
@@ -220,7 +222,7 @@ def _landing(motion: Motion, place: int, before: LocalFit) -> Boundary:
     time = float(motion.time[place])
     slope = before.slope(time) - motion.rate[place]
     height = before.value(time) - motion.contact[place]
-    # distance from the threshold to the impact on the surface
+    # time from the crossing of the threshold to the impact on the surface
     shift = -height / slope if slope < 0 else 0.0
     limit = 10 * motion.interval
     time = time + float(np.clip(shift, -limit, limit))
@@ -249,8 +251,8 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
 
 
 def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary:
-    """Return the release, or a later boundary if the follower may still be bouncing
-    then.
+    """Return the release, or a later boundary if the follower may still be bouncing at
+    the time of release.
 
     The rebounds of a low flight that ends on a receding surface are too low to be
     observed. The next flight begins no later than `latest` (s).
@@ -265,7 +267,7 @@ def _not_before(landing: Boundary | None, release: Boundary, latest) -> Boundary
 
 
 def _still_near(time: float, latest: float) -> Boundary:
-    """Return the end of a contact that continues while the motion is near the surface.
+    """Return the end of a contact that lasts as long as the motion is near the surface.
 
     If this end were a release, it would begin a flight that the model does not
     describe.
@@ -292,8 +294,8 @@ def _flight(sides, span, boundaries, left: set[int], doubted) -> Flight:
 
 
 def _clear_of(doubted: Sequence[Span], span: Span, count: int) -> Span:
-    """Return the samples of a flight without doubted stretches at the ends of the
-    recording, which are too short to show an impact.
+    """Return the part of a flight outside any doubted stretches at the ends of the
+    recording; these stretches are too short to show an impact.
     """
     first, last = span
     for a, b in doubted:

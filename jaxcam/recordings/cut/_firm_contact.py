@@ -19,14 +19,16 @@ from ._contact_stretches import stretches
 from ._hidden_hops import moved
 
 
-# Half of the window over which acceleration is measured, and the shortest contact (s)
+# Half-width of the window over which acceleration is measured, and minimum duration of
+# a contact (s)
 _HALF, _LASTS = 0.0125, 0.04
-# Significance levels, in standard errors of the noise and standard deviations of the
-# tolerances
+# Margins above the free acceleration, in standard errors due to the noise and in
+# standard deviations due to the tolerances
 _BEYOND, _SPREAD = 4.0, 3.0
-# Standard deviations of the noise below which a window is smooth
+# A window is smooth if its sum of squared residuals exceeds that expected from noise by
+# less than this many standard deviations
 _SMOOTH = 4.0
-# Positions at which the free acceleration is tabulated
+# Number of positions at which the free acceleration is tabulated
 _PLACES = 64
 
 
@@ -58,7 +60,8 @@ def firm_contact(
     found[half : len(samples) - half] = smooth & (held > most + error)
     firm = np.zeros(len(samples), dtype=bool)
     for first, last in stretches(found):
-        # omit the beginning, because preceding flights may be too low to be observed
+        # omit the beginning of a contact, because flights in it may be too low to be
+        # observed
         if (last - first) * recording.interval >= _LASTS:
             firm[first + half : last] = True
     return firm

@@ -24,8 +24,7 @@ def segment_gaps(
     restitution: float = 0.5,
     doubted: Sequence[tuple[int, int]] = (),
 ) -> Segments:
-    """Segment a recording at the impacts at each gap; the gaps are given at every
-    sample.
+    """Segment a recording at the impacts at each gap, given the gaps at every sample.
 
     There may be any number of bodies and surfaces; an impact at one gap ends the flight
     of all bodies.
@@ -38,11 +37,11 @@ def segment_gaps(
         tolerance, the gap is shifted to zero at the impacts.
     - `drive`: the drive of the system, if it has one.
     - `restitution`: expected value, for impacts too weak to be observed.
-    - `doubted`: stretches of samples, from the first to after the last, that a model of
+    - `doubted`: stretches of samples (the first, and one past the last) that a model of
         the flight does not describe; an impact is sought there.
 
-    **Returns:** the parts; `impacts.side` is the gap that closed, and `before` and
-    `after` are its rates of change.
+    **Returns:** the segments; `impacts.side` is the index of the gap that closed, and
+    `impacts.before` and `impacts.after` are its rates of change.
     """
     none = np.zeros(len(recording))
     sides = []

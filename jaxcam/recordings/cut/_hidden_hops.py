@@ -18,11 +18,11 @@ from .._drive import Drive
 from .._rig import Quantity, Rig
 
 
-# Number of samples per turn
+# Number of phases per turn
 _GRID = 720
-# Margin for the tolerances, in standard deviations
+# Margin for the tolerances of the rig, in standard deviations
 _SPREAD = 3.0
-# Largest angle (rad) by which a release may precede the others
+# Largest angle (rad) by which the phase of a release may precede that of the others
 _EARLY = 0.1
 
 
@@ -52,8 +52,8 @@ def hop_phases(rig: Rig, speed: float) -> Bool[np.ndarray, " 720"]:
 
 
 def _hop(pull: np.ndarray, step: float, restitution: float) -> int:
-    """Return the number of steps from a release to the next contact, at most one
-    turn.
+    """Return the number of steps from a release to the end of the bounces after the
+    flight, at most one turn.
     """
     rate = np.cumsum(pull) * step
     landed = np.flatnonzero(np.cumsum(rate) <= 0)
@@ -99,9 +99,9 @@ def may_hop(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
 
 
 def pressed(rig: Rig, drive: Drive) -> Bool[np.ndarray, " k"]:
-    """Return the samples that can be used to fit the surface if they are near it: those
-    at which no hidden flight is possible, or all samples if hidden flights are possible
-    everywhere.
+    """Return the samples that, if they are near the surface, can be used to fit it:
+    those at which no hidden flight is possible, or all samples if hidden flights are
+    possible at every phase.
     """
     doubtful = may_hop(rig, drive)
     return ~doubtful | doubtful.all()
@@ -127,9 +127,10 @@ def sure_contact(
 def before_release(
     angle: Float[np.ndarray, " k"], first: int, releases: Int[np.ndarray, " releases"]
 ) -> Bool[np.ndarray, " k"]:
-    """Return the samples at which a contact truncated by the end of the recording
-    certainly continues: those before the phase of the releases elsewhere in the
-    recording, because a release just before the end is not observed.
+    """Return the samples at which a contact that is cut off by the end of the recording
+    certainly continues. They are those before the phase at which releases occur
+    elsewhere in the recording, because a release just before the end would not be
+    observed.
 
     **Arguments:** the cam angle (rad), the first sample of the contact, and the samples
     of observed releases.

@@ -24,8 +24,8 @@ def impact_marks(
 ) -> list[int]:
     """Return the index of the first sample after each impact between two flights.
 
-    **Arguments:** the stretches of contact, and stretches in which an impact is
-    expected.
+    **Arguments:** `resting` are the stretches of contact, `doubted` those in which an
+    impact is expected.
     """
     kinks = find_kinks(motion.samples, motion.interval, motion.noise)
     marks = [int(kink) for kink in kinks]
@@ -34,7 +34,7 @@ def impact_marks(
         taken = [*resting, *((mark, mark + 1) for mark in marks)]
         if any(overlap((first, last), other) for other in taken):
             continue
-        # only samples that belong to the flights on both sides
+        # use only samples that belong to the flights on both sides
         begin = max([0, *(m for m in marks if m <= first)])
         begin = max([begin, *(b for _, b in resting if b <= first)])
         end = min([len(motion.time), *(m for m in marks if m >= last)])

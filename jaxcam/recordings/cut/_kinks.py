@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 from scipy.signal import find_peaks
 
 
-# Seconds needed on either side of a kink to detect it
+# Length (s) of the windows on either side of a kink in which it is detected
 WINDOW = 0.01
 
 
@@ -38,7 +38,8 @@ def jump_score(
     score = np.zeros(len(samples))
     if len(samples) < 2 * count:
         return score
-    # time is measured from half a sample before the first sample after the boundary
+    # the boundary is assumed to lie half a sampling interval before the first sample
+    # after it; times are measured from there
     offsets = (np.arange(count) + 0.5) * interval
     design = (offsets / offsets[-1])[:, None] ** np.arange(3)
     slope = np.linalg.pinv(design)[1] / offsets[-1]

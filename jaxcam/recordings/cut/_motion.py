@@ -8,12 +8,12 @@ from jaxtyping import Float
 from ._polynomial import fit_local, LocalFit
 
 
-# Longest stretch (s) that is fitted, and minimum number of samples when shortened
+# Longest stretch (s) that is fitted, and minimum number of samples when it is shortened
 _FIT_WINDOW, _FEWEST = 0.1, 16
-# Residuals (in units of the noise) above which a cubic does not follow a stretch
+# Rms residual (in units of the noise) above which a cubic does not follow a stretch
 _FOLLOWED = 2.0
-# Value of the next coefficient, in standard errors, above which a cubic does not follow
-# it either
+# Coefficient of the next power, in standard errors, above which a cubic does not follow
+# the stretch either
 _NEXT = 2.0
 
 
@@ -63,15 +63,16 @@ class Motion:
             count = shorter
 
     def _follows(self, fit: LocalFit, time, samples) -> bool:
-        """Return whether a fit describes the samples, and a further degree would not
-        improve it. An omitted degree would mainly distort the slope at the end.
+        """Return whether a fit describes the samples, and a further power would not
+        improve it. The omission of a significant power would mainly distort the slope
+        at the end.
         """
         off = samples - fit.values(time)
         degree = len(fit.coefficients)
         free = max(1, len(time) - degree)
         scale = max(float(np.max(np.abs(time - fit.origin))), np.finfo(float).tiny)
         powers = ((time - fit.origin) / scale)[:, None] ** np.arange(degree + 1)
-        # the component of the residuals in the direction that the next power adds
+        # the part of the residuals that the next power of time would describe
         added = np.linalg.qr(powers)[0][:, -1]
         if abs(float(added @ off)) > _NEXT * self.noise:
             return False

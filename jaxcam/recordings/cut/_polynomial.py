@@ -57,7 +57,8 @@ def fit_local(
     """
     degree = 3 if len(time) >= 24 else 2 if len(time) >= 8 else 1
     degree = min(degree, len(time) - 1)
-    # scaled to about 1, otherwise the normal matrix is nearly singular
+    # times are scaled to about 1, because otherwise the normal matrix is nearly
+    # singular
     scale = max(float(np.max(np.abs(time - origin))), np.finfo(float).tiny)
     powers = np.arange(degree + 1)
     design = ((time - origin) / scale)[:, None] ** powers
@@ -73,7 +74,8 @@ def crossing(
     """Return the time at which two fits meet, found by Newton's method, and its
     standard error (s).
 
-    The search extends to `reach` (s) from `time`, where both were fitted.
+    The search extends to `reach` (s) on either side of `time`, near which both were
+    fitted.
     """
     earliest, latest = time - reach, time + reach
     for _ in range(5):
@@ -100,12 +102,14 @@ def measured_noise(samples: Float[np.ndarray, " k"], order: int = 3) -> float:
     each = np.diff(samples, order)
     spread = np.median(np.abs(each)) / 0.6745
     usual = each[np.abs(each) <= 5 * spread]
-    # a difference of white noise has the sum of the squared binomials as its variance
+    # the variance of a difference of white noise is that of the noise times the sum of
+    # the squared binomial coefficients
     return float(np.sqrt(np.mean(usual**2) / math.comb(2 * order, order)))
 
 
 def least_noise(samples: Float[np.ndarray, " k"]) -> float:
-    """Return a lower bound of `measured_noise`, also valid for few samples per period.
+    """Return the smallest `measured_noise` over several orders of the differences, for
+    motions with few samples per period.
 
     Low-order differences contain the motion itself, high-order ones do not; white noise
     contributes equally to all of them.

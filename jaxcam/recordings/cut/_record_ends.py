@@ -38,15 +38,19 @@ def clear_of_end(motion: Motion, span: Span) -> Span:
 
 
 def _near(motion: Motion, fit, rows):
-    """Return whether a flight has come down to the surface at these samples."""
+    """Return whether the extrapolated flight is near the surface at each of these
+    samples.
+    """
     heights = np.array([fit.value(time) for time in motion.time[rows]])
     return heights - motion.contact[rows] < LOW * motion.noise
 
 
 def settled_alike(contacts: list[Contact], flights: list[Flight]) -> list[Contact]:
-    """Assign contacts with an unobserved start the settling time of the others.
+    """Assign the longest observed settling time to contacts whose start was not
+    observed.
 
-    A recording may begin in the middle of chatter.
+    The start is not observed, for example, if the recording begins in the middle of
+    chatter.
     """
     long = [f.stop for f in flights if f.last - f.first > SHORTEST_FLIGHT]
     seen = [any(contact.start is stop for stop in long) for contact in contacts]

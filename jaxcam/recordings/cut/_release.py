@@ -37,7 +37,7 @@ def release_time(
         - contact[None, :]
     )
     misfit = gap[None, :] - np.where(past > 0, free, 0.0)
-    # the surface may have a constant error
+    # subtract the mean, because the surface may have a constant error
     misfit = misfit - misfit.mean(1, keepdims=True)
     squares = np.sum(misfit**2, axis=1)[:-2] / noise**2
     best = int(np.argmin(squares))

@@ -22,11 +22,12 @@ from ._padding import padded
 # due to run-out, bearings or a bent shaft
 _HARMONICS = (2, 3)
 _HARMONIC_SIZE = 2e-4
-# Index at which the sines and the bend begin among the amplitudes
+# Indices at which the sines and the bend begin among the amplitudes
 _ENDS = (len(_HARMONICS), 2 * len(_HARMONICS))
-# Zero error of the cam angle (rad), including a sensor lag of half a millisecond
+# Size of the zero error of the cam angle (rad), including a sensor lag of half a
+# millisecond
 _PHASE_SIZE = 1e-2
-# Smallest tolerance of a length (m), because a rig file may not state one
+# Minimum tolerance of a length (m), also used if a rig file states none
 _LEAST_TOLERANCE = 2e-4
 
 

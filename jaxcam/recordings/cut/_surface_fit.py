@@ -36,8 +36,9 @@ _NEAR = 3.0
 # Number of samples that are averaged, and accepted penetration of the cam in units of
 # the noise: 4.5 standard errors of the mean, which noise hardly reaches
 _TOGETHER, _BEHIND = 9, 1.5
-# Half-widths (rad) of the band around the surface in which samples count as contact,
-# from the accuracy of the impacts alone to the noise of the encoder
+# Half-widths (rad), in successive fits, of the band around the surface in which samples
+# count as contact: from the accuracy of a surface fitted to impacts alone to the noise
+# of the encoder
 _BANDS = (2e-3, 1e-3, 5e-4)
 
 
@@ -93,7 +94,7 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
     included if the recordings agree on it.
 
     Args:
-        surface: The surface so far.
+        surface: The surface to refine.
         rig: The rig.
         segments: The segments of each recording.
 
@@ -148,7 +149,9 @@ def _unbent(surface: Surface) -> Surface:
 
 
 def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
-    """Return the most likely bend for the points of recordings that end at `ends`."""
+    """Return the prior standard deviations of the most likely bend, as `bend_sizes`
+    does. The points of each recording end at the index in `ends`.
+    """
     vector = vector_of(surface)
     misfit, rows, weight = _weighted(surface, vector, turned, angle, error)
     records = []
@@ -183,7 +186,8 @@ def _impact_points(recording, drive, channel, noise, sure):
         angle.append(0.5 * (before.value(moment) + after.value(moment)))
         error.append(before.value_stderr(moment) + after.value_stderr(moment))
     if len(kinks) == 0:
-        # no impact in the recording: either permanent contact, or no information
+        # a recording without impacts is either in permanent contact, or gives no
+        # information
         rows = np.flatnonzero(sure)[::8]
         return drive.angle[rows], samples[rows], np.full(len(rows), 4 * noise)
     return np.array(turned), np.array(angle), np.array(error)
@@ -212,7 +216,8 @@ def _solve(
     equal: int | None = None,
     bend: np.ndarray | None = None,
 ) -> Surface:
-    """Fit by Gauss-Newton with the tolerances as prior and Huber weights of the points.
+    """Fit a surface by Gauss-Newton, with the tolerances as prior and Huber weights for
+    the points.
 
     The first `equal` points lie on the profile, the others on or above it. Coefficients
     of a bend have the prior standard deviations `bend`.

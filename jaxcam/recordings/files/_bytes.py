@@ -9,8 +9,8 @@ from .._errors import RecordingError
 
 
 LARGEST = 100_000_000
-"""Maximum size of a decompressed table in bytes: ten minutes at 5 kHz, or an hour at
-800 Hz. Reading takes about ten times as much memory.
+"""Maximum size of a decompressed table in bytes, enough for ten minutes at 5 kHz or an
+hour at 800 Hz. Reading takes about ten times as much memory.
 """
 MOST = 15_000_000
 """Maximum number of values in a table, regardless of the file's size."""
@@ -31,7 +31,7 @@ def read_bytes(file: Path) -> bytes:
     if not file.exists():
         raise RecordingError(f"{file}: there is no such file; check the path.")
     if not file.is_file():
-        # a pipe may be endless
+        # a pipe is refused because it may be endless
         raise RecordingError(f"{file}: this is a pipe or a device; save it as a file.")
     with file.open("rb") as stream:
         raw = stream.read(LARGEST + 1)

@@ -7,11 +7,13 @@ from .._errors import RecordingError
 from .._recording import Recording
 
 
-# Encoders and clocks differ from the speed in the file name by much less than this
+# Allowed relative difference between the measured speed and that in the file name;
+# errors of encoders and clocks are much smaller
 _SPEED_TOLERANCE = 0.05
-# The lever stays below the vertical (rad); values in degrees exceed this
+# Largest follower angle (rad): the follower stays below the vertical, and values in
+# degrees exceed this limit
 _FOLLOWER_RANGE = np.pi / 2
-# s; shorter than the sampling interval of any encoder or gyro
+# Smallest plausible sampling interval (s), below that of any encoder or gyro
 _SHORTEST = 1e-9
 
 _DEGREES = "multiply it by pi/180 or name the column `{}_deg`"
@@ -22,8 +24,8 @@ def find_gaps(
 ) -> Int[np.ndarray, " pieces"]:
     """Return the index of the first sample after each gap in time.
 
-    **Raises:** `RecordingError` if time does not increase, and for a gap unless `gaps`
-    is `"split"`.
+    **Raises:** `RecordingError` if time does not increase, or if there is a gap and
+    `gaps` is not `"split"`.
     """
     if gaps not in ("refuse", "split"):
         raise RecordingError(f'gaps is "refuse", "split" or "mend", not {gaps!r}.')

@@ -52,7 +52,7 @@ def read_columns(
     source, mapping = _opened(file, columns)
     picks = [(name, *mapping.get(name, (name, 1.0))) for name in source.columns]
     if mapping or only:
-        # other columns are omitted unless needed
+        # omit all other columns, except those that are needed
         wanted = set(needed)
         picks = [
             pick
@@ -86,7 +86,9 @@ def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:
 def _opened(
     file: Path, columns: Columns | None
 ) -> tuple[Source, dict[str, tuple[str, float]]]:
-    """Read a file and the new names of its columns."""
+    """Return the content of a file, and the channel and factor of each column that is
+    renamed.
+    """
     if columns is None:
         return _source(file, None), {}
     if isinstance(columns, Mapping):
@@ -151,7 +153,9 @@ def _mapping(
 
 
 def _timed(source: Source, found: dict, rate: float | None) -> dict:
-    """Return the columns with a time, computed from a rate if the file has none."""
+    """Return the columns; if there is no time column, add one that follows from the
+    rate.
+    """
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise RecordingError(
             f"{source.file}: the rate is {rate:g} samples per second; give a positive "

@@ -8,10 +8,11 @@ from jaxtyping import Float
 _DIGITS = 9
 # Smallest number of samples to determine a clock
 _LEAST = 16
-# s; later times have too few digits left for a clock
+# Largest time (s) for which a clock is reconstructed; larger times leave too few digits
+# for it
 _LATEST = 1e6
-# In units of the last digit: rounding error of one half, plus the error of the fitted
-# line
+# Largest deviation from a clock, in units of the last digit: rounding error of one
+# half, plus the error of the fitted line
 _REACH = 0.75
 
 
@@ -32,8 +33,8 @@ def unrounded(time: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         return time
     near = np.abs(steps - usual) < 1.5 * digit
     ticks = np.round(steps / np.mean(steps[near]))
-    # a clock without missing ticks is tried first, because with few digits per tick,
-    # rounding has the same effect
+    # a clock without missing ticks is tried first, because rounding to few digits per
+    # tick has the same effect as missing ticks
     for counted in (np.ones_like(ticks), np.maximum(ticks, 1.0)):
         place = np.concatenate([[0.0], np.cumsum(counted)])
         even = np.polyval(np.polyfit(place, time, 1), place)

@@ -21,7 +21,8 @@ _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|i
 class Form(NamedTuple):
     """The form of a table: the separator of its cells, and the lines of its parts.
 
-    `names` and `units` are separate lines, or `None`; `first` is the first row.
+    `names` and `units` are the indices of the lines of names and of units, or `None`;
+    `first` is that of the first row.
     """
 
     separator: str
@@ -67,8 +68,8 @@ def _first_row(lines: Sequence[str], separator: str) -> int | None:
 
 
 def _kind(line: str, separator: str) -> tuple[int, int]:
-    """Return the number of cells and of numbers in a row; zero if a cell is other
-    text.
+    """Return the number of cells and of numbers in a row; the latter is zero if a cell
+    contains other text.
     """
     if line.startswith(COMMENTS):
         return 0, 0
@@ -92,13 +93,15 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
         if all(map(is_unit, lower)):
             names, units = above, names
         elif any(map(is_time, upper)) and not any(map(is_time, lower)):
-            # the first row of the table contains text instead of numbers
+            # the lower line is not a header, but a first row with text instead of
+            # numbers
             return Form(separator, above, None, names)
     for k in range((names if units is None else units) + 1, first):
         cells = cells_of(lines[k], separator)
         if lines[k].startswith(COMMENTS) or not any(map(is_number, cells)):
             continue
-        # text next to a number is a note if the separator is a space or missing
+        # a line with text next to a number is a note if the separator is a space or is
+        # missing
         note = len(cells) != width and (separator == " " or len(cells) == 1)
         if not note:
             return Form(separator, names, units, k)
@@ -107,7 +110,7 @@ def _headed(lines: Sequence[str], separator: str, first: int) -> Form:
 
 def _is_head(line: str, separator: str, width: int) -> bool:
     cells = cells_of(bare(line), separator)
-    # a note has one word, in its first cell
+    # a header has more than one cell with text; a note has text only in its first cell
     words = any(cells[1:]) or (len(cells) == 2 and bool(cells[0]))
     return len(cells) == width and words and not any(map(is_number, cells))
 

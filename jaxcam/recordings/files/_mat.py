@@ -104,7 +104,8 @@ def _loaded(file: Path) -> dict[str, Any]:
     _refuse_bomb(file, raw)
     try:
         with warnings.catch_warnings():
-            # loadmat only warns of faults such as several variables with the same name
+            # loadmat only warns about faults such as several variables with the same
+            # name
             warnings.simplefilter("error")
             return loadmat(io.BytesIO(raw), squeeze_me=True, struct_as_record=False)
     except Exception:

@@ -79,14 +79,15 @@ def _unslipped(
     # usual change of the angle between two samples
     usual = np.median(steps)
     turns = np.round((steps - usual) / (2 * np.pi))
-    # the drive keeps turning across a gap at which the recording is split
+    # a jump across a gap at which the recording is split is no slip: the drive keeps
+    # turning
     turns[np.diff(recording.time) > (bridge + 1.5) * recording.interval] = 0
     places = np.flatnonzero(turns)
     if not len(places):
         return samples
     unslipped = samples - 2 * np.pi * np.concatenate([[0.0], np.cumsum(turns)])
     if np.ptp(samples) <= 2 * np.pi and np.ptp(unslipped) > 2 * np.pi:
-        # an angle that is reset every turn is not a fault
+        # an angle that is reset every turn is not a fault, so no repair is noted
         return unslipped
     first = recording.time[places[0] + 1]
     total = (
@@ -146,7 +147,7 @@ def _bridged(recording: Recording, bridge: int, notes) -> list[Recording]:
 def _even(recording: Recording, rows, name: str, interval: float) -> Recording:
     """Return one piece with the dropped samples replaced by cubic interpolation."""
     time = recording.time[rows]
-    # step by step, so that jitter of the samples does not accumulate
+    # round each interval separately, so that jitter of the samples does not accumulate
     ticks = np.maximum(np.round(np.diff(time) / interval).astype(int), 1)
     places = np.concatenate([[0], np.cumsum(ticks)])
     count = places[-1] + 1

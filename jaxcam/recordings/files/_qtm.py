@@ -10,7 +10,7 @@ import pandas as pd
 def qtm_heading(
     preamble: Sequence[str], width: int
 ) -> tuple[list[str], float | None] | None:
-    """Return column names and sampling rate, or `None` for another program's file.
+    """Return column names and sampling rate, or `None` for a file of another program.
 
     **Arguments:** the lines above the numbers, and the number of columns.
     """

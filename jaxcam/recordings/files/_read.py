@@ -216,7 +216,7 @@ def _split(name, time, values, speed, file, breaks) -> list[Recording]:
 
 
 def _turning(label: str, mended: Mended) -> list[Recording]:
-    """Return the pieces in which the cam turns far enough.
+    """Return the pieces in which the cam turns by at least half a turn.
 
     **Raises:** `RecordingError` if none is left.
     """
@@ -240,7 +240,7 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
 
 
 def _noted(piece: Recording, notes: tuple[str, ...]) -> Recording:
-    """Add remarks on omitted data of the file to the notes of a piece."""
+    """Return a piece whose notes begin with the remarks on omitted data of its file."""
     if not notes:
         return piece
     said = (*notes, *piece.meta.get("notes", ()))

@@ -13,8 +13,8 @@ from jaxtyping import Float
 from .._errors import RecordingError
 
 
-# Limit of plausible values in any unit, including microseconds since 1970; its fourth
-# power is still finite
+# Largest plausible value in any unit (including microseconds since 1970), small enough
+# for its fourth power to be finite
 _LARGEST_NUMBER = 1e18
 # maximum number of names in a sentence
 _LISTED = 12
@@ -24,8 +24,8 @@ _LISTED = 12
 class Source:
     """Columns of a file, as text or as numbers.
 
-    - `columns`: the columns by name; as text for a text file.
-    - `headings`: their headings in the file.
+    - `columns`: the columns by name; those of a text file contain text.
+    - `headings`: the name of the column for each heading in the file.
     - `rate`: samples per second, if the file gives them outside the table.
     - `notes`: remarks on omitted data.
     """
@@ -37,7 +37,9 @@ class Source:
     notes: tuple[str, ...] = ()
 
     def name_of(self, word: str) -> str:
-        """Return the column of this name. **Raises:** `RecordingError` if missing."""
+        """Return the name of the column with this name or heading. **Raises:**
+        `RecordingError` if missing.
+        """
         if word in self.columns:
             return word
         if word in self.headings:

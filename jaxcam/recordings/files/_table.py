@@ -83,9 +83,7 @@ def table_of_lines(
 
 
 def _without_last(titles: list[str], rows: list[str], separator: str):
-    """Return names and rows, without a trailing separator present in only one of
-    them.
-    """
+    """Return names and rows; a separator at the end of only one of them is removed."""
     count = len(cells_of(rows[0], separator))
     if count == len(titles) - 1 and not titles[-1]:
         return titles[:-1], rows
@@ -128,7 +126,7 @@ def _titles(file: Path, lines: list[str], form: Form) -> list[str]:
 
 
 def _headings(lines: list[str], form: Form) -> dict[str, str]:
-    """Return the headings of the columns in the file."""
+    """Return the column name for each heading in the file."""
     if form.names is None:
         return {}
     words = cells_of(bare(lines[form.names]), form.separator)
@@ -169,7 +167,7 @@ def _has_words(column: pd.Series) -> bool:
 
 
 def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
-    """Reject a last line with missing values or digits, left by a stopped writer."""
+    """Reject a last line that lacks values or digits because its writer was stopped."""
     if separator == " ":
         counts = np.array([len(row.split()) for row in rows])
     else:
@@ -177,8 +175,8 @@ def _refuse_cut_line(file, whole, rows, separator, width, named) -> None:
     wrong = np.flatnonzero(counts != width)
     cut = len(wrong) > 0
     if not cut and not whole:
-        # No value is missing. A number shorter than all others in its column has lost
-        # digits; this can be detected only in a fixed format.
+        # No value is missing. If the last number is shorter than all others in its
+        # column, which have the same number of decimals, it has lost digits.
         last = [len(_decimals(cells_of(row, separator)[-1])) for row in rows]
         cut = len(set(last[:-1])) == 1 and last[-1] < last[0]
     if cut and (len(wrong) == 0 or wrong[0] == len(rows) - 1):

@@ -90,8 +90,8 @@ def _decoded(file: Path, raw: bytes) -> str:
     except UnicodeDecodeError:
         pass
     try:
-        # the file may come from a Western Windows system and contain a degree or micro
-        # sign
+        # a file from a Western Windows system may contain a degree or micro sign in
+        # this encoding
         text = raw.decode("cp1252") if not raw.startswith(_UTF16) else "\0"
     except UnicodeDecodeError:
         text = "\0"

@@ -100,7 +100,7 @@ class Section:
     def _parts(self, key: str, unit: str | None) -> tuple[Any, Any]:
         self.read.append(key)
         if key not in self.table:
-            # a misspelt key is the usual reason, so the existing keys are compared
+            # the key is probably misspelt, so a similar one is suggested
             found = difflib.get_close_matches(key, self.table, n=1)
             hint = f"; is `{found[0]}` meant?" if found else "; add it."
             raise RigError(f"{self.file}: [{self.name}] has no `{key}`{hint}")
@@ -117,7 +117,9 @@ class Section:
         return entry["value"], entry.get("tolerance")
 
     def as_number(self, key: str, value: Any) -> float:
-        """Return a valid number. **Raises:** `RigError`."""
+        """Return a value as a number. **Raises:** `RigError` if it is not a valid
+        number.
+        """
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not abs(value) < _LARGEST_NUMBER:
             raise self.error(
@@ -149,7 +151,9 @@ def known_keys(file: Path, place: str, table: dict[str, Any], names) -> None:
 
 
 def printable(text: str) -> str:
-    """Shorten foreign text for use in a sentence, on one line."""
+    """Return text from a file for use in a sentence: printable, shortened and on one
+    line.
+    """
     text = "".join(c if c.isprintable() else "?" for c in text)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
