@@ -23,7 +23,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    # for a bug, an ordinary traceback is easier to report
+    # an ordinary Python traceback is easier to include in a bug report
     pretty_exceptions_enable=False,
 )
 app.command()(one_sentence(simulate))
@@ -72,7 +72,8 @@ def main() -> None:
         app()
     except SystemExit as end:
         if end.code == INTERRUPTED:
-            # pending XLA computations would crash the interpreter as it shuts down
+            # exit at once, because pending XLA computations would crash the interpreter
+            # during an orderly shutdown
             sys.stdout.flush()
             sys.stderr.flush()
             os._exit(INTERRUPTED)

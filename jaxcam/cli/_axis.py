@@ -16,9 +16,9 @@ class Axis(NamedTuple):
 
     parameter: str
     unit: float
-    """The unit used on the command line, in SI units."""
+    """Size of the unit used on the command line, in SI units; pi/30 for rpm."""
     symbol: str = ""
-    """Symbol of this unit, if it is known."""
+    """Symbol of this unit; empty if it is unknown."""
 
     @staticmethod
     def of(
@@ -26,7 +26,7 @@ class Axis(NamedTuple):
     ) -> "Axis":
         """Return the axis of a parameter of a system, both given by name.
 
-        **Arguments:** the units of parameters, as far as they are known.
+        **Arguments:** `units`: the known units of parameters, by parameter name.
         """
         if parameter == "speed" and system == CAM:
             return Axis(parameter, math.pi / 30, "rpm")
@@ -43,12 +43,16 @@ class Axis(NamedTuple):
 
     @property
     def label(self) -> tuple[str, str]:
-        """Name and unit, for figures."""
+        """Name and unit of the parameter, for the axes of figures."""
         return self.parameter, self.symbol
 
 
 def ordered_bounds(low: float | None, high: float | None) -> tuple[float, float]:
-    """Return `--from` and `--to` in order. **Raises:** `ValueError`."""
+    """Return the values of `--from` and `--to`.
+
+    Raises:
+        ValueError: A value is missing or not finite, or the first is not the lower one.
+    """
     if low is None or high is None:
         raise ValueError(
             "Give the lowest and the highest value of the parameter: --from A --to B."

@@ -106,8 +106,8 @@ def _count(made) -> int:
 
 
 def _entropy(made, shape) -> dict | None:
-    """Compute the basin entropies over the varying components; None if the grid is too
-    coarse.
+    """Return the basin entropies over the components that vary, or None if the grid is
+    too coarse.
     """
     from ..sweeps import basin_entropy
 

@@ -9,7 +9,7 @@ from ._checks import at_least, check_size, numbers
 from ._choices import CAM
 
 
-# default corners: a region with impacts
+# default corners of the grid, which enclose a region in which impacts occur
 _BOXES = {
     CAM: ((0.33, -3.0), (0.55, 3.0)),
     "impact-oscillator": ((-1.0, -2.0), (0.0, 2.0)),
@@ -62,7 +62,7 @@ class Cells:
         check_size("--shape and --keep", *(max(1, k) for k in cells), self.keep)
 
     def corners(self, system: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the lowest and highest state; the default depends on the system."""
+        """Return the corners of the grid; their defaults depend on the system."""
         box = _BOXES.get(system)
         if box is None and (self.low is None or self.high is None):
             raise ValueError(

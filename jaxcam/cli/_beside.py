@@ -15,10 +15,10 @@ T = TypeVar("T")
 def beside(
     work: Callable[[Path], T], folder: Path | None
 ) -> Iterator[Callable[[], T | None]]:
-    """Start `work(folder)` in another process; return a function that awaits the
+    """Start `work(folder)` in another process, and yield a function that waits for its
     result.
 
-    Without a folder, nothing is done and the result is `None`.
+    If `folder` is `None`, nothing is started, and the result is `None`.
     """
     if folder is None:
         yield lambda: None

@@ -25,5 +25,6 @@ def keep_compiled_programs() -> None:
     # compile
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-    # an entry that cannot be read or written is compiled again, and nothing is lost
+    # if the entry of a program cannot be read or written, the program is simply
+    # compiled again
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation")

@@ -6,9 +6,9 @@ from ._files_options import Files
 
 
 def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
-    """Read the recordings of a folder or of one file, and the rig file.
+    """Read the recordings in a folder or in a single file, and their rig file.
 
-    **Arguments:** `system` is `FILE.py:CLASS` and replaces the system of the rig file.
+    **Arguments:** `system`: `FILE.py:CLASS`, which replaces the system of the rig file.
 
     Returns:
         A `Case`, and a `Rig` or a `Setup`.
@@ -31,7 +31,9 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
 
 
 def _runs(case: Path, channels, files: Files, layout):
-    """Read the recordings; options of the command line take precedence."""
+    """Read the recordings; options on the command line take precedence over the rig
+    file.
+    """
     from ..recordings import read_case
     from ..recordings.files import Case, read_recordings
 
@@ -49,7 +51,7 @@ def _runs(case: Path, channels, files: Files, layout):
 
 
 def notes_of(runs) -> tuple[str, ...]:
-    """Return the repairs made while the recordings were read, each note once."""
+    """Return notes on the repairs made while reading the recordings, each note once."""
     return tuple(dict.fromkeys(n for run in runs for n in run.meta.get("notes", ())))
 
 

@@ -14,8 +14,8 @@ def numbers(
 ) -> tuple[float, ...]:
     """Parse numbers separated by commas. **Raises:** `ValueError`.
 
-    **Arguments:** `finite`: whether to reject non-finite numbers; not needed if the
-    system rejects them with its own message.
+    **Arguments:** `finite`: whether to reject non-finite numbers; `False` if the system
+    rejects them later, with a message of its own.
     """
     try:
         found = tuple(float(part) for part in text.split(","))

@@ -10,7 +10,7 @@ class Ready(NamedTuple):
 
     model: str
     state: tuple[float, ...] | None
-    """None is the release point."""
+    """Default initial state; None for the release point."""
     turns: float | None
     """Default number of forcing periods; None for a duration in seconds."""
     duration: float
@@ -36,7 +36,7 @@ _LISTED = 20
 
 
 def choose(option: str, name: str, known: Iterable[str]) -> str:
-    """Return a known name. **Raises:** `ValueError` that lists the known names."""
+    """Return a known name. **Raises:** `ValueError` with names to choose from."""
     known = tuple(known)
     if name in known:
         return name
@@ -48,14 +48,16 @@ def choose(option: str, name: str, known: Iterable[str]) -> str:
 
 
 def ready(name: str) -> Ready:
-    """Return the default start; for a user's system, the release point and ten
-    periods.
+    """Return the default start of a system.
+
+    A system that is not listed here starts from its release point and runs for ten
+    forcing periods.
     """
     return SYSTEMS.get(name, Ready(name, None, 10.0, 0.0))
 
 
 def make_solver(name: str):
-    """Return a diffrax solver. **Raises:** `ValueError` that lists the names."""
+    """Return a diffrax solver by its name. **Raises:** `ValueError` for other names."""
     import diffrax
 
     return getattr(diffrax, SOLVERS[choose("--solver", name, SOLVERS)])()

@@ -119,7 +119,7 @@ def _refuse_interrupted(path: Path) -> None:
         try:
             points = continuation.load_branch(file).points if file.is_file() else ()
         except ValueError:
-            # not a branch, so it may be overwritten
+            # the file does not contain a branch, so it may be overwritten
             continue
         if points and points[-1].kind != "end":
             raise ValueError(

@@ -42,7 +42,7 @@ class BranchRange:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Return the lowest and highest value."""
+        """Return the lowest and highest value of the parameter."""
         return ordered_bounds(self.low, self.high)
 
     def started(self, model, axis: Axis):
@@ -75,7 +75,7 @@ class BranchRange:
 
 @dataclasses.dataclass(frozen=True)
 class Following:
-    """The first orbit, and the settings of its branch."""
+    """The initial orbit, and the settings for following its branch."""
 
     state: Annotated[
         str | None,
@@ -124,7 +124,7 @@ class Following:
 
     @property
     def guess(self):
-        """Return a state near the orbit, or None."""
+        """Return the state given as the first guess of the orbit, or None."""
         import numpy as np
 
         if self.state is None:

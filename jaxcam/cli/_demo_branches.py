@@ -14,7 +14,7 @@ _BOUNDS = ((130.0, 154.0), (115.0, 160.0))
 
 @dataclasses.dataclass(frozen=True)
 class Branches:
-    """Rows under `HEADINGS`, and a figure."""
+    """The branches as rows of a table with the columns `HEADINGS`, and as a figure."""
 
     rows: tuple[tuple[str, str, str, str], ...]
     figure: Path

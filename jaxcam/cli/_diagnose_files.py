@@ -12,7 +12,7 @@ from ._output import to_text, write_text
 from ._saved_system import as_saved
 
 
-# Each figure's file and caption
+# The file and the caption of each figure
 Figures: TypeAlias = list[tuple[Path, str]]
 
 

@@ -23,12 +23,12 @@ from ..plotting.labels import labelled
 
 
 _BINS = 36
-# longest line of a label (letters)
+# maximum length of a line of a label (characters)
 _LABEL = 42
 
 
 def unit_along(variable: str, motion: str) -> str:
-    """Return the unit of a shape's argument, if the motion has the unit `motion`."""
+    """Return the unit of the argument of a shape, given the unit of the motion."""
     of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
     if variable in of_drive:
         return of_drive[Variable(variable)]
@@ -170,7 +170,9 @@ def _maps(plt, found: Diagnosis):
 
 
 def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
-    """Return the values of `resting` to draw: flight, and contact if there is any."""
+    """Return the values of `resting` for which residuals are drawn: `False` (flight),
+    and `True` (contact) if there is any contact.
+    """
     return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
@@ -218,8 +220,8 @@ def _missing(plt, found: Diagnosis):
 
 
 def _unit_of(one: MissingFunction, argument: str, motion: str) -> str:
-    """Return the unit of an argument of a missing term, if the motion has the unit
-    `motion`.
+    """Return the unit of an argument of a missing function, given the unit of the
+    motion.
     """
     if argument == "frequency":
         return "Hz"

@@ -21,7 +21,7 @@ def diagnosis_page(
     notes: Sequence[str],
     outlook: Outlook = Outlook(),
 ) -> str:
-    """Return the page as text; it loads nothing from elsewhere."""
+    """Return the page as HTML text that needs no other files."""
     title = f"{found.case or 'Recordings'}: {_title(found)}"
     parts = [
         f"<h1>{escape(title)}</h1>",
@@ -91,7 +91,7 @@ def _effects(found: Diagnosis) -> list[str]:
 
 
 def _before_and_after(found: Diagnosis) -> list[str]:
-    # the same unit as in the figures
+    # choose the same unit as in the figures
     factor, unit = scaled(found.unit, REACH * found.noise_floor)
     parts = [
         "<h2>Error on held-out flights</h2>",
@@ -144,7 +144,7 @@ def _left_over(found: Diagnosis) -> list[str]:
         for one in found.left_after
     ]
     if not rows:
-        # not computed for a model with unnamed functions
+        # the table is not computed for a model with unnamed functions
         return []
     headings = ("free function", "where", "gain", "threshold", "significant")
     return [

@@ -114,7 +114,8 @@ def diagram(
 def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
     import numpy as np
 
-    # with --dwell, fewer periods fit into the time at low speeds
+    # with --dwell, fewer periods fit into the recording time at low speeds, and the
+    # remaining samples are NaN
     total = int(np.prod(made.states.shape[:3]))
     if sweep.dwell is not None:
         total = int(np.isfinite(made.states[..., 0]).sum())
@@ -130,7 +131,7 @@ def _sentence(system: str, made, axis: Axis, sweep: Sweep) -> str:
 
 
 def _table(ranges, axis: Axis):
-    """Tabulate the labels in order of the parameter, at most one screenful."""
+    """Tabulate the labels in the order of the parameter values, at most 40 of them."""
     from rich.table import Table
 
     table = Table(title=f"Attractors against {axis.name}")

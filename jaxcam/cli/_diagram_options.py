@@ -77,7 +77,7 @@ class Sweep:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Return the lowest and highest value."""
+        """Return the lowest and highest value of the parameter."""
         return ordered_bounds(self.low, self.high)
 
     @property

@@ -16,7 +16,7 @@ BAD_INPUT = 2
 STOPPED_EARLY = 1
 INTERRUPTED = 130
 
-# messages written for Python refer to arguments, which are options here
+# messages for Python users name arguments; on the command line, these are options
 _OPTIONS = (
     ("or pass state=None to start", "or give --state release to start"),
     ("state=None needs", "a start at the release point needs"),
@@ -31,7 +31,7 @@ _OPTIONS = (
 
 
 def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Wrap a command so that invalid input ends it with one sentence."""
+    """Wrap a command so that invalid input leads to one sentence and an exit code."""
 
     @functools.wraps(command)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -41,7 +41,7 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
             fail("Stopped by Ctrl-C before the end; run the command again to finish.")
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
-            # the reader of the pipe has closed it (jaxcam ... | head)
+            # the program that reads the output has ended (jaxcam ... | head)
             raise
         except OSError as error:
             fail(_about_file(error))
@@ -66,7 +66,7 @@ def fail(message: str) -> None:
 
 
 def _shortened(word: str) -> str:
-    """Shorten a word of a message that is excessively long, such as a path."""
+    """Shorten an excessively long word of a message, such as a path."""
     return word if len(word) <= 300 else f"{word[:40]}...{word[-20:]}"
 
 

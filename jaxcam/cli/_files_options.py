@@ -56,11 +56,11 @@ class Files:
 
     @property
     def how(self) -> Literal["mend", "refuse", "split"]:
-        """Return `gaps` in the form that the readers expect."""
+        """Return `gaps` with the type that the functions for reading files declare."""
         return self.gaps  # pyright: ignore
 
     def named(self) -> list[str] | dict[str, tuple[str, float]] | None:
-        """Return `--columns` in the form that the readers expect.
+        """Return `--columns` in the form that the functions for reading files expect.
 
         Raises:
             ValueError: Names and pairs are mixed, or a factor is not a number.

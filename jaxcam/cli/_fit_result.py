@@ -80,12 +80,13 @@ class Result:
         drive, model = self.segments[0].drive, self.after.model(0)
         for one in self.problem.parameters:
             if one.known is not None:
-                # the fitted value of a condition holds only for the first recording
+                # a condition known for each recording has its value in the first
+                # recording here; save its usual value instead
                 usual = one.where(self.problem.model)
                 model = eqx.tree_at(one.where, model, usual)
         system = model.system
         if drive is not None:
-            # the complete model: the drive runs at constant speed, and its angle is
+            # in the saved model, the drive runs at constant speed, and its angle is
             # zero at time zero
             system = model.uniform(0.0, drive.speed)
         return as_saved(system, fit)

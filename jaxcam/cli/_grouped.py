@@ -8,7 +8,7 @@ from typing import Any, get_type_hints
 
 
 def grouped(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Convert a command whose parameters may be dataclasses into one for typer.
+    """Convert a command with dataclasses as parameters into one that typer accepts.
 
     Typer sees the fields of each dataclass as separate options, and the command
     receives the dataclass with their values.

@@ -28,14 +28,14 @@ def impact_laws(
         try:
             laws = restitution_laws(there)
         except RecordingError:
-            # a fit of the motion needs no impacts
+            # too few impacts for a law, but the motion can still be fitted
             continue
         found |= {f"{before}{name}": law for name, law in laws.items()}
     return found
 
 
 def _on(part: Segments, side: int) -> Segments:
-    """Return a recording with the impacts at one of its gaps only."""
+    """Return a recording that retains only the impacts at one gap."""
     keep = part.impacts.side == side
     columns = {
         field.name: getattr(part.impacts, field.name)[keep]

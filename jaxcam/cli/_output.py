@@ -16,7 +16,7 @@ from rich.table import Table
 from ._lock import hold
 
 
-# more columns than any table has
+# a width that exceeds that of any table (characters)
 _WIDEST = 10_000
 
 
@@ -54,9 +54,9 @@ class Output:
         self.console = Console(quiet=self.to_stdout, highlight=False)
 
     def print(self, *what) -> None:
-        """Print tables as tables, and sentences unchanged.
+        """Print tables and sentences to the terminal.
 
-        A table that is wider than the terminal is not cut.
+        A table that is wider than the terminal is not truncated.
         """
         wide = self.console.options.update(max_width=_WIDEST)
         needed = [
@@ -89,7 +89,7 @@ def write_text(file: Path, text: str) -> None:
     one.
     """
     if file.exists() and (file.is_symlink() or not file.is_file()):
-        # a device, or the target of a link, is written in place
+        # write to a device or through a link directly, so that it is not replaced
         file.write_text(text, encoding="utf-8")
         return
     part = _beside(file)

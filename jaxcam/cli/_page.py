@@ -84,7 +84,7 @@ def _branches(found: Branches | None) -> list[str]:
 
 
 def page(report: Report) -> str:
-    """Return the page as text; it loads nothing from elsewhere."""
+    """Return the page as HTML text that needs no other files."""
     parts = [
         f"<h1>{escape(report.title)}</h1>",
         *_lacks(report.lacks),
@@ -130,7 +130,7 @@ _MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most significant a
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    # the same unit as in the figures
+    # choose the same unit as in the figures
     factor, unit = scaled(row.unit, 4 * max(row.rms, row.noise))
     sizes = (f"{factor * one:.2g}" for one in (row.rms, row.noise))
     numbers = (f"{row.ratio:.2f}", *sizes)

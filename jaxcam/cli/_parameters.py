@@ -15,7 +15,7 @@ from ..models import CamFollower, ConstantRestitution
 from ._source import make_system, Source
 
 
-# the cam speed is in rad/s; on the command line, it is in rpm and has its own option
+# the cam speed, in rad/s here; the command line has an option for it, in rpm
 _SPEED = "speed"
 _CONSTANT = "restitution.r"
 
@@ -30,7 +30,7 @@ def make_model(
     """Create a system with the parameters given on the command line.
 
     Raises:
-        ValueError: A name or value is invalid; the message names the fix.
+        ValueError: A name or value is invalid; the message states the remedy.
     """
     return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
 
@@ -41,9 +41,10 @@ def parameters(system: HybridSystem) -> dict[str, float]:
 
 
 def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
-    """Return the system with `name=value` for some of its parameters.
+    """Return the system with new values of some of its parameters.
 
-    `restitution.r=0.6` gives a cam-follower a constant coefficient of restitution.
+    Each assignment is a text `name=value`. For example, `restitution.r=0.6` gives a
+    cam-follower a constant coefficient of restitution.
 
     Raises:
         ValueError: A name is not a parameter, or a value is not a number.
@@ -106,7 +107,7 @@ def _leaves(system) -> dict[str, jax.Array]:
     kept = eqx.filter(system, eqx.is_inexact_array)
     found, _ = jax.tree_util.tree_flatten_with_path(kept)
     names = (jax.tree_util.keystr(path).lstrip(".") for path, _ in found)
-    # for a system with added terms, the speed keeps its short name
+    # the speed keeps its short name if terms are added to the system
     names = [_SPEED if name == f"base.{_SPEED}" else name for name in names]
     return dict(zip(names, (leaf for _, leaf in found)))
 

@@ -1,4 +1,4 @@
-"""A progress bar on standard error, or lines if it is not a terminal."""
+"""A progress bar on standard error, or lines of text if that is not a terminal."""
 
 import time
 from collections.abc import Callable, Iterator

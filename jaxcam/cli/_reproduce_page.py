@@ -37,7 +37,7 @@ _CHAPTERS = {
 
 
 def cells(row) -> tuple[str, ...]:
-    """Return a row of a table as text, under `HEADINGS`."""
+    """Return the cells of a row as text, in the order of `HEADINGS`."""
     printed, lost = math.isfinite(row.printed), not math.isfinite(row.computed)
     both = printed and not lost
     relative = both and math.isfinite(row.relative)

@@ -68,8 +68,8 @@ def make(
 ) -> TargetRecord:
     """Compute a target, and draw it if a folder is given.
 
-    **Arguments:** `keep_going`: an exception becomes part of the record; `progress`: as
-    in `reproduce`, also called while the figure is drawn.
+    **Arguments:** `keep_going`: whether to store an exception in the record instead of
+    raising it; `progress`: as in `reproduce`, also called while the figure is drawn.
     """
     begin, rows, drawn = time.perf_counter(), [], False
     try:
@@ -144,7 +144,7 @@ def by_other_code(out: Path, names: Iterable[str], settings: Origin) -> list[str
 
 def _read(out: Path, name: str) -> TargetRecord:
     found = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
-    # records without a mark are from different code
+    # a record without a mark was computed by different code
     found["settings"] = Origin(**{"code": "", **found["settings"]})
     if found["name"] != name or not isinstance(found.get("figure", False), bool):
         raise ValueError("the record of another target, or damaged")

@@ -1,4 +1,4 @@
-"""Axes of residual plots: a suitable unit, and drive angle or time."""
+"""Axes of residual plots: residuals in a suitable unit against drive angle or time."""
 
 import math
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
 
 
 class Along:
-    """The axis of a residual plot: drive angle, or time if there is no drive."""
+    """The horizontal axis of residual plots: drive angle, or time without a drive."""
 
     def __init__(self, parts: Sequence[Residuals]):
         self.turns = all(np.any(np.isfinite(part.turned)) for part in parts)
@@ -52,7 +52,7 @@ class Along:
         return "drive angle" if self.turns else "time"
 
     def place(self, part: Residuals) -> Float[np.ndarray, " k"]:
-        """Return the positions of the residuals on the axis (from `start` to `end`)."""
+        """Return the positions of residuals on the axis, between `start` and `end`."""
         if not self.turns:
             return part.time
         return np.nan_to_num(part.turned) % (2 * math.pi)

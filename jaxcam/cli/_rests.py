@@ -1,4 +1,4 @@
-"""Contact intervals of the follower: as recorded, and as simulated."""
+"""Contact intervals of the follower, recorded and simulated."""
 
 import dataclasses
 import math
@@ -61,9 +61,10 @@ class Rests:
 
 
 def simulate_run(rig: Rig, run: Segments) -> Trajectory:
-    """Simulate the nominal model at the mean speed of a recording, up to its end.
+    """Simulate the nominal model at the mean speed of a recording.
 
-    The simulation starts at a release point, twenty cam turns before the recording.
+    The simulation starts at a release point, twenty cam turns before the recording, and
+    ends with the recording.
     """
     assert run.drive is not None
     system = rig.system(run.drive.speed, run.drive.phase)
@@ -79,7 +80,7 @@ def rests(run: Segments, motion: Trajectory) -> Rests:
 
 
 def rest_table(found: list[Rests]) -> Table:
-    """Return a table with one row for each recording and kind, for the terminal."""
+    """Return a table with two rows per recording (recorded, simulated)."""
     table = Table(title="Contact intervals of the follower")
     table.add_column("recording", no_wrap=True)
     table.add_column("source")
@@ -102,7 +103,7 @@ HEADINGS = (
 
 
 def rest_rows(one: Rests) -> list[tuple[str, ...]]:
-    """Return the cells of the two rows of a recording, under `HEADINGS`."""
+    """Return the two rows of a recording, with cells in the order of `HEADINGS`."""
     rows = []
     for which, part in one.parts:
         name = one.name if which == "recorded" else ""
@@ -152,5 +153,5 @@ def _typical(angle: Float[np.ndarray, " k"]) -> str:
     turned = np.mod(angle - np.angle(mean) + math.pi, 2 * math.pi) - math.pi
     middle = (np.angle(mean) + np.mean(turned)) % (2 * math.pi)
     spread = f"{np.std(turned):.2f}"
-    # a periodic motion has no spread
+    # for a periodic motion, the standard deviation is zero and is not shown
     return f"{middle:.2f}" if float(spread) == 0 else f"{middle:.2f} ± {spread}"

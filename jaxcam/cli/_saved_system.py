@@ -12,9 +12,10 @@ _SOURCE = "source"
 
 
 def as_saved(system: HybridSystem, about: dict[str, Any]) -> dict[str, Any]:
-    """Return a system as JSON, with the source file if it is outside the package.
+    """Return a system as JSON, with the name of its source file if that is outside the
+    package.
 
-    A system that cannot be saved yields `about`, and the reason as `not_saved`.
+    If a system cannot be saved, only `about` and the reason (`not_saved`) are returned.
     """
     from ..discrepancy.terms import WithTerms
     from ..fitting.own_systems import system_source
@@ -57,7 +58,7 @@ def _source_of(file: Path) -> str | None:
     try:
         found = json.loads(file.read_text("utf-8"))
     except (ValueError, RecursionError):
-        # other errors are reported when the rest is read
+        # the function that reads the complete file reports such errors
         return None
     source = found.get(_SOURCE) if isinstance(found, dict) else None
     return source if isinstance(source, str) else None

@@ -28,7 +28,7 @@ class Source:
         return self.saved is not None or self.rig is not None
 
     def system(self) -> HybridSystem:
-        """Return the saved system, or the one in a Python file with its nominal values.
+        """Return the saved system, or the system of a Python file with nominal values.
 
         Raises:
             ValueError: A file is invalid; the message gives its name and the remedy.
@@ -57,7 +57,7 @@ class Source:
         return read_rig(self.rig).system(float(CamFollower().speed))
 
     def units(self) -> dict[str, str]:
-        """Return the units that the rig file gives, by the names of the parameters."""
+        """Return the units stated in the rig file, by parameter name."""
         from ..fitting import is_setup, read_setup
 
         if self.rig is None or not is_setup(self.rig):
@@ -67,7 +67,7 @@ class Source:
         return {one.name: one.unit for one in found if one.unit}
 
     def name(self, word: str) -> str:
-        """Return the name of the system; `word` names a built-in system.
+        """Return the name of the system: `word`, unless a file defines the system.
 
         Raises:
             ValueError: The name is unknown, or the file is invalid.
@@ -94,7 +94,7 @@ def make_system(
     """Create a system; `preset` and a speed in rpm apply to the cam-follower only.
 
     Raises:
-        ValueError: The options do not fit the system; the message names the fix.
+        ValueError: The options do not fit the system; the message states the remedy.
     """
     import equinox as eqx
     import jax.numpy as jnp

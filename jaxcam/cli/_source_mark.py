@@ -25,7 +25,7 @@ def source_mark() -> str:
 
 
 def source_hash(folders: list[Path], words: list[str]) -> str:
-    """Hash the names and contents of the Python files in folders, and extra words."""
+    """Hash the names and contents of the Python files in folders, and further words."""
     found = hashlib.sha256("\n".join(words).encode())
     for folder in folders:
         for file in sorted(folder.rglob("*")):

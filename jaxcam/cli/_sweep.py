@@ -50,7 +50,7 @@ class Execution:
 
     @contextmanager
     def running(self) -> Iterator[dict]:
-        """Return the execution options of a sweep."""
+        """Yield the keyword arguments that determine how a sweep is executed."""
         try:
             if self.cluster is None:
                 yield {"workers": self.workers}
@@ -59,7 +59,7 @@ class Execution:
 
             from ..sweeps import cluster
 
-            # so that new processes find the compiled programs
+            # let new processes find the compiled programs
             folder = jax.config.jax_compilation_cache_dir  # pyright: ignore
             if folder:
                 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))

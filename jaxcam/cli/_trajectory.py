@@ -14,12 +14,12 @@ from ._parameters import parameters
 
 # number of rows shown at either end of a table
 _ENDS = 6
-# largest numbers of periods that stay readable in a time history and a phase portrait
+# maximum number of periods drawn in a time history, and in a phase portrait
 _HISTORY, _PORTRAIT = 6.0, 40.0
 
 
 def impact_table(trajectory: Trajectory) -> Table | None:
-    """Tabulate the first and the last impacts; None without impacts."""
+    """Tabulate the first and the last impacts; return None if there are no impacts."""
     impacts, system = trajectory.impacts, trajectory.system
     time = np.asarray(impacts.time)
     if not len(time):
@@ -54,7 +54,7 @@ def impact_table(trajectory: Trajectory) -> Table | None:
 
 
 def contact_table(trajectory: Trajectory) -> Table | None:
-    """Tabulate the first and the last contacts; None without contacts."""
+    """Tabulate the first and the last contacts; return None if there are none."""
     contacts, system = trajectory.contacts, trajectory.system
     start, end = np.asarray(contacts.start), np.asarray(contacts.end)
     if not len(start):
@@ -147,7 +147,7 @@ def draw(trajectory: Trajectory, folder: Path) -> list[Path]:
 
 
 def last(trajectory: Trajectory, periods: float) -> tuple[float, float] | None:
-    """Return the span of the last periods of a longer run; None for all of it."""
+    """Return the time span of the last `periods`; None if the run is hardly longer."""
     period = trajectory.system.period
     if period is None:
         return None
@@ -157,8 +157,9 @@ def last(trajectory: Trajectory, periods: float) -> tuple[float, float] | None:
 
 
 def span_of_history(trajectory: Trajectory) -> str:
-    """Return a sentence on the part of the motion that the time history shows, empty if
-    it shows all of it.
+    """Return a sentence that states which part of the motion the time history shows.
+
+    The sentence is empty if the time history shows the entire motion.
     """
     if last(trajectory, _HISTORY) is None:
         return ""
@@ -172,7 +173,7 @@ def _shown(number: int) -> list[int | None]:
 
 
 def _period(system) -> float | None:
-    """Return the period of an active forcing; a floor at rest has none."""
+    """Return the forcing period; None without forcing, or if its amplitude is zero."""
     if system.period is None or float(getattr(system, "amplitude", 1.0)) == 0:
         return None
     return float(system.period)

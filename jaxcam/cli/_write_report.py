@@ -19,7 +19,7 @@ def write_report(found: "Diagnosis", folder: str | Path) -> Path:
     Returns:
         The path of `index.html`.
     """
-    # other commands start without the diagnosis
+    # imported here, so that other commands need not load the diagnosis
     from ._diagnose_files import write_diagnosis
 
     where = Path(folder)

@@ -69,7 +69,7 @@ def diagnose(
         drive: For a bare system, its measured drive or input.
         case: Name of the case.
         seed: Seed of the block bootstrap.
-        progress: Called with a sentence and a fraction, or `None`.
+        progress: Called with a sentence and the completed fraction (or `None`).
         keep: Folder in which fits are stored until the diagnosis is complete; an
             interrupted diagnosis continues from there.
         policy: Settings that determine the verdict and limit the search time.
@@ -179,7 +179,7 @@ def _answered(
         rough = _roughly(question, bare, seed, report, keep, policy)
         if not rough.choice.explained(policy):
             return diagnosis_of(case, *rough, ripple)
-        # the physics was found, so that the stated noise can be used
+        # the physics was found, so the search is repeated with the stated noise
         trials.attempt(rough.choice.best.names, rough.choice.best, policy.iterations)
     best = Search(trials).run()
     if rough is not None and rough.choice.missing is None:
@@ -190,7 +190,9 @@ def _answered(
 
 
 class _Roughly(NamedTuple):
-    """A choice that allows for errors of the model."""
+    """A question that allows for errors of the model, with its fits and the terms
+    chosen.
+    """
 
     question: Question
     trials: Trials
@@ -205,7 +207,7 @@ def _roughly(
     keep: Path | None,
     policy: Policy,
 ) -> _Roughly:
-    """Choose with joints and noise that allow for errors of the model.
+    """Choose terms with joints and noise that allow for errors of the model.
 
     **Arguments:** `bare`: the fit of the textbook model to complete flights.
     """

@@ -27,9 +27,9 @@ def sought_elsewhere(
 ) -> Diagnosis:
     """Return the diagnosis at the location where the missing physics explains most.
 
-    **Arguments:** the diagnosis at the first coordinate and gap, which falls short; a
-    function that diagnoses at a given location; and whether the terms are those of the
-    library, which act at any gap.
+    **Arguments:** the diagnosis at the first coordinate and gap, which leaves part of
+    the residual unexplained; a function that diagnoses at a given location; and whether
+    the terms are those of the library, which can act at any gap.
     """
     problem = found.after.problem
     system = problem.model.system

@@ -94,7 +94,7 @@ def event_causes(
     paths, here = [], None
     for term in terms or (None,):
         system = WithTerms(rig, () if term is None else (term,))
-        # at zero strength all systems are the same rig
+        # at zero strength, no term changes the rig, so all paths share one start
         paths.append(_Path(goal, jax.tree.map(jnp.asarray, system), here))
         here = paths[0].here
     found = [_none(paths[0])]
@@ -148,7 +148,7 @@ class _Path:
     def left(self, strength: float, pull: float) -> Float[np.ndarray, " m"]:
         found = self.at(strength, pull)
         if np.isfinite(found.values).all():
-            # the next search starts here
+            # the next search starts from these speeds
             self.here = found
         return self.goal.left(found.values, pull)
 
@@ -195,7 +195,9 @@ def _best(path: _Path, term: Term) -> EventCause:
 
 
 def _along(path: _Path, size: float) -> tuple[float, float, EventSpeeds]:
-    """Find the smallest misfit between zero and large strengths."""
+    """Return the smallest misfit for strengths from zero to large ones, with the
+    strength and the speeds there.
+    """
     best, policy = (math.inf, 0.0, path.here), path.goal.policy
     first, ratio, most = policy.cause_strengths
     for k in range(most):

@@ -107,7 +107,7 @@ def _at(system, speed):
 
 
 def _float_of(system: WithTerms) -> SpecialPoint | None:
-    """Return the valve-float speed, searched for from that of the base."""
+    """Find the detachment (valve float), starting from that of the base alone."""
     base = float_speed(system.base)  # pyright: ignore
     if not (np.isfinite(base.speed) and base.speed > 0):
         return None

@@ -11,13 +11,14 @@ _USED, _LIMIT = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 
 
 def make_room(used: Path = _USED, limit: Path = _LIMIT) -> bool:
-    """Drop compiled programs if another diagnosis might exceed the limit.
+    """Discard the compiled programs if another diagnosis might exceed the limit on
+    memory mappings.
 
     Each program uses some of the memory mappings that Linux allows per process; beyond
     the limit, the compiler fails with "Cannot allocate memory". On other operating
     systems, this function does nothing.
 
-    **Returns:** whether programs were dropped.
+    **Returns:** whether the programs were discarded.
     """
     try:
         most = int(limit.read_text())

@@ -129,8 +129,8 @@ def _refuse_hidden(found: Diagnosis) -> None:
 
 
 def _of_others(parameter: Parameter, records: int) -> Parameter:
-    """Return a parameter for new recordings; a constant known for each recording keeps
-    its value from the first one.
+    """Return a parameter adapted to new recordings: a constant that is known for each
+    recording takes its value from the first one.
     """
     if parameter.known is None:
         return parameter
@@ -208,7 +208,7 @@ def next_experiments(
                 model.sensors,
                 length,
                 rng=rng,
-                # a follower starts from its release, other systems as recorded
+                # a follower starts from its release point, others from a recorded state
                 state=None if isinstance(rig, Rig) else jnp.asarray(states[nearest]),
                 settle=found.policy.next_settle,
                 interval=parts[0].recording.interval,
@@ -270,7 +270,7 @@ def _of_parameter(free: Iterable[str], name: str) -> _Question:
 
 
 def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
-    """Return the target quantities, as parameters and functions."""
+    """Return the target quantities (parameters and functions), by name."""
     own = {
         term.name: [one.name for one in term.strengths() if not one.inner]
         for term in _terms(found)
@@ -282,7 +282,7 @@ def _questions(found: Diagnosis, asked) -> dict[str, _Question]:
         part
         for other in found.alternatives
         if other.delta_bic < found.policy.rival
-        # an additional term is not an alternative to the named terms
+        # subsets that only add terms to the named ones are not alternatives
         and not (named and set(named) <= set(other.terms))
         for part in other.terms
         if part in own

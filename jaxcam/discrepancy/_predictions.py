@@ -58,8 +58,8 @@ def predictions(
     missing effects: those of detachment (valve float), of the fold and the flip of
     P(1,1), and of the interruption of complete chatter. Their standard errors are
     estimated from random rigs, drawn from the distribution of the fitted parameters.
-    Of the missing effects, terms with a frequency of their own are left out, because
-    with such a term the motion is not periodic with the cam.
+    Missing effects with a frequency of their own are left out, because they make the
+    motion aperiodic: it does not repeat with the cam.
 
     Args:
         found: The diagnosis.
@@ -114,7 +114,8 @@ def _spread(drawn: np.ndarray) -> float:
 
 
 def _system(fit: Fit, values: np.ndarray, names, present: bool) -> WithTerms:
-    """Return the rig with some parameters; absent terms have zero strength.
+    """Return the rig with given parameter values and terms; unless these are `present`,
+    their strengths are zero.
 
     Both models have the same structure, so one compiled program serves both.
     """

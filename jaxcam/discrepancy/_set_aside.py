@@ -1,7 +1,7 @@
 """Find and exclude a recording that is inconsistent with the others.
 
-Physics shared by all recordings cannot explain a misread one (wrong gain, rig or
-unit), and a misread recording would hide the physics missing in all of them.
+Physics common to all recordings cannot explain a single misread recording (wrong gain,
+rig or unit). If it is not excluded, this recording hides physics missing in the others.
 """
 
 import dataclasses
@@ -13,12 +13,12 @@ from .report import Caveat, Diagnosis, Reason
 
 
 def odd_record(found: Diagnosis) -> str | None:
-    """Return the recording that a diagnosis leaves unexplained while it explains all
-    others.
+    """Return the name of the only recording that a diagnosis leaves unexplained, if
+    there is one.
 
     There must be at least `policy.records_apart` recordings. The cost per sample of the
-    inconsistent one must be at least `policy.near`, and at least `policy.odd` times
-    that of every other recording.
+    unexplained recording must be at least `policy.near`, and at least `policy.odd`
+    times that of every other recording.
     """
     policy, costs = found.policy, cost_by_record(found.after)
     if len(costs) < policy.records_apart:
@@ -30,7 +30,7 @@ def odd_record(found: Diagnosis) -> str | None:
 
 
 def cost_by_record(found: Fit) -> dict[str, float]:
-    """Return the cost per sample of each recording; 1 if only noise remains."""
+    """Return the cost per sample of each recording; near 1 if only noise remains."""
     problem, costs = found.problem, found.costs
     exists = np.asarray(problem.pieces.exists)
     flown = np.where(exists, np.asarray(costs.flown) + np.asarray(costs.joints), 0.0)

@@ -13,11 +13,11 @@ from .sections import AbstractSection
 
 
 _FINE = 1 / 64
-"""Extent of the cells used to distinguish non-periodic motions."""
+"""Extent, in units of the scale, of the cells that distinguish non-periodic motions."""
 
 
 class BasinsJob(AbstractJob):
-    """Computes some rows of the grid at a time."""
+    """Computes the motions that start from some rows of the grid in each block."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class BasinsJob(AbstractJob):
             "fingerprint": StoredVariable(
                 (*dims, "mean"), (*tail, fingerprint_size(n)), "float64"
             ),
-            # zero for periodic motions, which compresses well
+            # zero for periodic motions, so that the array compresses well
             "cells": StoredVariable((*dims, "sample"), (*tail, keep), "int64"),
         }
         coordinates = {
@@ -85,7 +85,7 @@ def default_scale(grid: Grid) -> np.ndarray:
 def some_rows(
     section, grid, scale, bounds, turns, keep, period_tolerance, reruns
 ) -> Arrays:
-    """Compute the motions from some rows of the grid."""
+    """Compute the motions that start from some rows of the grid."""
     states = grid.states(*bounds)
     samples, labels = settle(
         section, states, turns, keep, period_tolerance=period_tolerance, reruns=reruns

@@ -106,7 +106,7 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
     """
     attractor = np.asarray(attractor)
     axes = [axis for axis, k in enumerate(attractor.shape) if k > 1]
-    # the same states at every distance, so that the edges of the grid have no effect
+    # use the same states at all distances, so that the edges of the grid do not matter
     margin = max(distances)
     found = []
     for distance in distances:
@@ -125,7 +125,7 @@ def uncertainty_exponent(attractor, distances=(1, 2, 4, 8, 16)) -> Uncertainty:
             "there are uncertain states at fewer than two distances; use a finer grid, "
             "or one that contains a basin boundary"
         )
-    # slow to import, and needed only for this line
+    # imported here because it is slow to import
     from scipy.stats import linregress
 
     distance, fraction = map(np.array, zip(*found, strict=True))

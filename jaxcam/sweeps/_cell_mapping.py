@@ -104,7 +104,7 @@ def follow_cells(image, shape) -> CellMapping:
 
 
 def _steps(pointer, cyclic):
-    """Return the number of iterations until a cycle is reached, by doubling."""
+    """Return the number of iterations until each cell reaches a cycle, by doubling."""
     steps = np.where(cyclic, 0, 1)
     far = np.where(cyclic, np.arange(len(pointer)), pointer)
     while True:

@@ -115,7 +115,9 @@ def chart(
 
 
 class ChartJob(AbstractJob):
-    """Computes some values of the second parameter and all of the first."""
+    """Computes the motions for some values of the second parameter, and for all values
+    of the first, in each block.
+    """
 
     def __init__(
         self,
@@ -192,7 +194,7 @@ def some_pairs(
     section, where, pairs, starts, shape, turns, keep, period_tolerance, reruns,
     exponents,
 ) -> Arrays:  # fmt: skip
-    """Compute labels, and exponents if requested, for some pairs of values."""
+    """Compute labels (and exponents if requested) for some pairs of values."""
     count, n = starts.shape[1:]
     values = np.repeat(pairs, count, axis=0)
     samples, labels = settle(

@@ -124,7 +124,8 @@ class CarriedJob(DiagramJob):
         index = np.concatenate([order[::way] for way in ways])
         going = np.repeat(np.array(ways, dtype=np.int8), len(values))
         self.first = np.zeros(len(index), dtype=bool)
-        # the way down starts from the final state of the way up
+        # only the first motion starts from a given state; a downward sweep continues
+        # from the final state of the upward sweep
         self.first[0] = True
         return values[index], starts[index], going
 
@@ -178,15 +179,15 @@ def one_after_the_other(
     """Compute the motions at the given values in order; `first` marks the values at
     which the motions start from the given initial states.
 
-    **Arguments:** `turns`, `keep`: one number for each value; `room`: capacity for
-    samples, padded with NaN.
+    **Arguments:** `turns`, `keep`: one number for each value; `room`: number of samples
+    stored at each value, padded with NaN.
     """
     rows = []
     for value, start, anew, many, kept in zip(
         values, starts, first, turns, keep, strict=True
     ):
         state = start if anew or carried is None else carried
-        # a failed motion is restarted
+        # after a failed motion, start again from the given initial state
         state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
         lanes = np.full(len(state), value)
         state = section.lifted(state, where, lanes)

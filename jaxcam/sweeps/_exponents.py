@@ -25,7 +25,7 @@ class Exponents(NamedTuple):
 
     @property
     def chaotic(self) -> np.ndarray:
-        """Return whether the exponent is positive by at least three standard errors."""
+        """Return whether the exponent exceeds zero by three standard errors or more."""
         return self.largest > 3 * self.stderr
 
 
@@ -106,8 +106,8 @@ def _within(progress, begun: float, size: float, share: float) -> None:
 
 
 def _together(system, where, values, lanes):
-    """Yield the motions of each call, their system, and its varying parameter and
-    values.
+    """Yield the groups of motions that are computed together: the indices of the
+    motions, their system, the parameter that varies among them, and its values.
     """
     everybody = np.arange(lanes)
     if where is None:

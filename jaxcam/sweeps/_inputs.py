@@ -14,7 +14,7 @@ def as_section(system) -> AbstractSection:
     """Return a section unchanged, or the stroboscopic section of a hybrid system.
 
     Raises:
-        ValueError: The argument is neither, or the system has no period.
+        ValueError: The argument is neither of these, or the system has no period.
     """
     if isinstance(system, AbstractSection):
         section = system
@@ -38,7 +38,7 @@ def as_section(system) -> AbstractSection:
 def check_turns(
     turns: int, keep: int, period_tolerance: float, reruns: int = 0
 ) -> None:
-    """Raise `ValueError` for inconsistent numbers."""
+    """Raise `ValueError` for numbers that are invalid or inconsistent."""
     if not 1 <= keep <= turns:
         raise ValueError(
             f"keep is {keep} and turns is {turns}; keep at least 1 of these periods"
@@ -53,8 +53,8 @@ def check_turns(
 
 
 def as_values(values, parameters: int) -> np.ndarray:
-    """Return parameter values, shape `(points,)`, or `(points, parameters)` for
-    several.
+    """Return parameter values, shape `(points,)`, or `(points, parameters)` for several
+    parameters.
     """
     values = np.asarray(values, dtype=float)
     shape = (len(values),) if parameters == 1 else (len(values), parameters)

@@ -21,11 +21,11 @@ from .sections import AbstractSection, component_coordinates
 _SHOWN = 64
 """Maximum number of points kept of each attractor."""
 _ALIKE = 0.05
-"""Distance, in units of the scale, below which two orbits are the same attractor."""
+"""Distance, in units of the scale, below which an orbit counts as a known one."""
 
 
 def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Dataset:
-    """Return the number of the attractor of each state, and the attractors."""
+    """Return a dataset with the attractor number of each state, and the attractors."""
     grid, section, layout = job.grid, job.section, job.layout
     impacts, turns, fingerprint = [], [], []
     visited, lanes = [], 0
@@ -89,7 +89,7 @@ def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
     for k, length in enumerate(labels.turns):
         orbit = longer[k]
         if length > 0:
-            # start at the smallest point
+            # list the points of a periodic orbit from the smallest one onwards
             one = orbit[:length]
             first = int(np.lexsort(np.round(one, 6).T[::-1])[0])
             orbit = np.full_like(orbit, np.nan)
@@ -99,8 +99,10 @@ def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
 
 
 def _renumbered(number, found: Attractors, orbit, known: Basins):
-    """Return the numbers that attractors have in other basins; new ones are
-    appended.
+    """Renumber attractors as in the `known` basins; those not found there are appended.
+
+    **Returns:** the attractor number of each state; the labels and orbits of all
+    attractors.
     """
     labels = np.stack([found.impacts, found.turns], axis=1)
     both = (known.labels, labels)

@@ -14,16 +14,15 @@ from .speeds import at_speed, speed_of
 
 
 INTERRUPTION = 152.67658
-"""Interruption speed of the rig of the thesis (section 6.7.1), and speed of Table
-6.1.
-"""
+"""Speed of the interruption for the rig of the thesis (rpm, section 6.7.1)."""
 REFERENCE = 152.67
+"""Speed of Table 6.1 (rpm)."""
 _RANGE, _RANGES = 12.0, 5
 """Width of the search ranges (rpm), and number of further ranges on either side of the
 speed in the thesis.
 """
 _MOVED = 0.01
-"""Resolution (rpm) of printed speeds shifted to another rig's interruption."""
+"""Resolution (rpm) of the shift of printed speeds to another rig's interruption."""
 
 
 @remembered
@@ -39,8 +38,8 @@ def interruption(system: CamFollower) -> CamFollower:
         ends = np.array([middle - _RANGE / 2, middle + _RANGE / 2])
         low, high = np.asarray(rpm_to_rad_s(ends))
         found = _search(system, low, high)
-        # above the interruption, the chatter is incomplete; at detachment, it is the
-        # reverse
+        # chatter must be complete below the speed found, and incomplete above it; at
+        # detachment, it is the other way round
         if bool(found.converged) and found.ends[0] < 0 < found.ends[1]:
             return at_speed(system, found.value)
     far = _RANGE * (_RANGES + 0.5)
@@ -57,11 +56,11 @@ def _search(system, low, high):
 
 
 def beside_interruption(system: CamFollower, rpm: float) -> float:
-    """Return a speed (rpm) at the same distance from the interruption as a printed
-    speed.
+    """Return a speed (rpm) as far from the interruption of a rig as a printed speed is
+    from that of the thesis.
 
-    It is rounded to 0.01 rpm, so that printed speeds are unchanged for the rig of the
-    thesis.
+    The shift is rounded to 0.01 rpm, so that printed speeds are unchanged for the rig
+    of the thesis.
     """
     own = float(rad_s_to_rpm(interruption(system).speed))
     moved = round((own - INTERRUPTION) / _MOVED) * _MOVED

@@ -87,7 +87,7 @@ def nominal_rig(rotation: str = "clockwise") -> CamFollower:
     lift.
 
     The last column of Table 6.1 implies this time origin: relative and absolute
-    velocity agree at the end of the period, so the contact velocity is zero there.
+    velocity agree at the end of the period, so the lift has zero velocity there.
     """
     system = CamFollower(restitution=restitution_law().law, rotation=rotation)
     angles = jnp.linspace(0.0, 2 * jnp.pi, 4097)
@@ -118,7 +118,8 @@ def tolerances(system: CamFollower) -> list[float]:
     """Return 2 % of each nominal value; y0, which is zero, has the tolerance of x0.
 
     Only the sum of the cam radius and the follower's half height is identifiable, so
-    the radius has the tolerance of the sum. The phases have none.
+    the radius has the tolerance of the sum. The phase and the accumulation time have no
+    tolerance.
     """
     cam = system.profile
     sizes = [
@@ -188,7 +189,9 @@ def published(system: CamFollower) -> list[Published]:
 
 
 def fit_rig(rotation: str = "clockwise", max_steps: int = 512) -> PublishedFit:
-    """Fit seven parameters of the rig, and two phases, to Tables 5.2 and 6.1."""
+    """Fit seven parameters of the rig, its phase, and the accumulation time to Tables
+    5.2 and 6.1.
+    """
     nominal = nominal_rig(rotation)
     start = Observed(nominal, jnp.asarray(table_6_1.ACCUMULATION[0]))
     return fit_published(

@@ -39,7 +39,7 @@ def draw_gap(ax, run: Trajectory) -> None:
     ax.plot(drawn.time, drawn.gap[:, 0], color=FLIGHT, lw=1.1)
     ax.axhline(0, color="0.4", lw=0.7)
     if np.nanmax(np.abs(drawn.gap)) < 1e-9:
-        # permanent contact: rounding is not shown
+        # in permanent contact, choose a scale that does not show rounding errors
         ax.set_ylim(-1e-3, 1e-3)
     ax.set_ylabel("gap (rad)")
 

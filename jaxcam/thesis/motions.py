@@ -47,7 +47,7 @@ def motion_target(
 ) -> MotionTarget:
     """Create the target of a figure of motions, drawn one below the other.
 
-    **Arguments:** `layout`: function that draws the motions of the rig instead.
+    **Arguments:** `layout`: function that draws the motions in another arrangement.
     """
 
     def compute(system: CamFollower) -> Rows:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 Report: TypeAlias = Callable[[str, float | None], None]
-"""Callback that takes a sentence and a fraction, or None."""
+"""Callback that takes a sentence and the completed fraction (or None)."""
 
 
 def _ignore(sentence: str, fraction: float | None) -> None:
@@ -62,7 +62,7 @@ def of_share(sentence: str) -> Callable[[float], None]:
 
 
 def of_branch(low: float, high: float) -> "Callable[[Point], None]":
-    """Return the callback for a branch in the speed between bounds (rpm).
+    """Return the callback for a branch that is followed between two speeds (rpm).
 
     It reports the number of points and the fraction of the range that they span.
     """
@@ -80,7 +80,7 @@ def of_branch(low: float, high: float) -> "Callable[[Point], None]":
 
 
 def counted(sentence: str, items: Collection[_T]) -> Iterator[_T]:
-    """Yield each item, first reporting how many are done."""
+    """Yield each item after reporting its number and the completed fraction."""
     for k, item in enumerate(items):
         report(f"{sentence}, {k + 1} of {len(items)}", k / len(items))
         yield item

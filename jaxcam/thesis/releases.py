@@ -24,7 +24,7 @@ _LOOKS = 8
 def released_turn(system: CamFollower, rpm: float) -> Trajectory:
     """Simulate 1.1 turns from the release of a sticking orbit."""
     rig = at_speed(system, rpm_to_rad_s(rpm))
-    # a rig with another phase may be in contact at time zero: also try later times
+    # a rig with another phase may be in contact at time zero, so try later times too
     times = float(rig.period) / _LOOKS * np.arange(_LOOKS)
     found = [_release(rig, time) for time in times]
     release = next((one for one in found if float(one.holds) == 0), found[0])
@@ -84,7 +84,7 @@ def released_target(title: str, *cases: tuple[float, float], note: str = "") -> 
 
 
 def _draw(system: CamFollower, cases) -> Figure:
-    """Draw the gap in the turn from a release, with a panel for each speed."""
+    """Draw the gap in the turn after a release: one row of panels for each speed."""
     figure, axes = plt.subplots(len(cases), 2, figsize=(9.6, 2.4 * len(cases)))
     for (left, right), (rpm, _) in zip(axes, cases, strict=True):
         run = released_turn(system, rpm)

@@ -40,7 +40,7 @@ class ShownMotion(NamedTuple):
 
 
 class SettledMotion(NamedTuple):
-    """A settled motion."""
+    """A motion after its transient, with its label."""
 
     case: ShownMotion
     impacts: int
@@ -60,7 +60,7 @@ class SettledMotion(NamedTuple):
 
 @remembered
 def settled(system: CamFollower, cases: tuple[ShownMotion, ...]) -> list[SettledMotion]:
-    """Simulate the cases until they repeat, for at most 2100 turns."""
+    """Simulate the cases until the motions repeat, for at most 2100 turns."""
     section = Stroboscopic(system)
     speeds = np.asarray(rpm_to_rad_s(np.array([case.rpm for case in cases])))
     states = np.array(section.starts(speed_of, speeds))
@@ -98,7 +98,7 @@ def run_of(system: CamFollower, motion: SettledMotion, turns: float) -> Trajecto
 
 
 def motion_rows(found: Sequence[SettledMotion]) -> Rows:
-    """Return rows that compare labels, as numbers, with the printed labels."""
+    """Return rows that compare the computed labels with the printed ones."""
     rows: Rows = []
     for motion in found:
         case, at = motion.case, motion.case.title

@@ -66,8 +66,9 @@ def beyond_tolerance(trials: Trials, best: Trial, deviation) -> list[Beyond]:
 def acting_alike(trials: Trials, best: Trial, name: str) -> Iterator[str]:
     """Yield the terms that the data cannot distinguish from a parameter of the rig.
 
-    A term is indistinguishable if almost none of its information remains when that
-    parameter is free, although most of it remains when all other parameters are free.
+    A term is indistinguishable if almost none of the information on its strength
+    remains when that parameter is free, although most of it remains when all other
+    parameters are free.
     """
     blocks = trials.blocks(best)
     information = np.sum(blocks.information, axis=0)
@@ -87,7 +88,7 @@ def acting_alike(trials: Trials, best: Trial, name: str) -> Iterator[str]:
 
 
 def _left(information, row: int, free) -> float:
-    """Return the information on one parameter when others are free."""
+    """Return the information that is left on one parameter when others are free."""
     free = free[np.diag(information)[free] > 0]
     inside = invert_information(information[np.ix_(free, free)])
     across = information[row, free]

@@ -48,8 +48,8 @@ class Choice:
     - `inclusion`, `deviation`: results of the bootstrap, by term and by parameter.
     - `doubtful`: terms that were dropped, with the fraction of the bootstrap samples
         that retain them; `needed`: those that are named nevertheless.
-    - `masked`: terms that were dropped because the smoothed corner of another term may
-        leave as much unexplained, with their fractions of the explained cost.
+    - `masked`: terms that were dropped because they may only compensate for the
+        smoothed corner of another term, with their fractions of the explained cost.
     - `beyond`: rig parameters that are outside their tolerances.
     - `missing`: unnamed functions that explain more than named terms;
         `needs`: their bootstrap results, by label; `rivals`: other functions that were
@@ -99,7 +99,8 @@ class Choice:
 
 
 def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choice:
-    """Drop terms that depend on a few blocks, and test the residuals.
+    """Drop terms that only a few blocks of the recordings support, and test the
+    residuals of the remaining terms.
 
     **Arguments:** the question, its fits, the best subset of terms, and the seed.
 
@@ -115,12 +116,12 @@ def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choic
     left_after = _left(question, trials, best) if best.names else left_before
     held, needed = None, []
     if doubtful and any(one.significant for one in left_after):
-        # there certainly is a discrepancy, and the term explains all of it
+        # some discrepancy is certain: test whether the doubtful terms explain it
         with_all = _left(question, trials, found)
         if not any(one.significant for one in with_all):
             whole = held_out(trials, before, found)
-            # a term must improve held-out prediction; the second criterion is that of
-            # a shape
+            # the terms must improve the prediction of held-out data, or each half of
+            # the recordings must support the strengths estimated from the other
             if whole.after < whole.before or trials.foretells(best, found):
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
@@ -157,7 +158,7 @@ def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choic
             needed, beyond = [], []
     after = best.fit if missing is None else missing.fit
     if after is not before.fit:
-        # the parameters of the textbook model are within their tolerances
+        # report the textbook model with its parameters within their tolerances
         before = dataclasses.replace(before, fit=_bounded(trials, before.fit, after))
     if missing is not None:
         different = differing(missing.fit, trials.policy)
@@ -190,8 +191,8 @@ def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choic
 def _fewest(
     different: Differing | None, without: Differing | None, bic: float, policy: Policy
 ) -> Differing | None:
-    """Return the separate values with the smallest BIC, if it is smaller than that of
-    the named terms; in a tie, those without these terms.
+    """Return the separate values with the smallest BIC, if that is smaller than the BIC
+    of the named terms; in a tie, return those fitted without named terms.
 
     **Arguments:** separate values in addition to the named terms, and without them; the
     BIC of the terms.
@@ -201,7 +202,7 @@ def _fewest(
     fewest = min(separate, key=lambda one: one.bic, default=None)
     if fewest is None or without is None or not _explains(without, bic):
         return fewest
-    # terms that hardly improve a fit with separate values only imitate these
+    # terms that hardly improve a fit with separate values only imitate these values
     return without if without.bic < fewest.bic + policy.tie else fewest
 
 
@@ -233,8 +234,7 @@ def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Tri
         outside = Outside(one)
         for name in acting_alike(trials, best, one.name):
             trial = trials.attempt(best.names | {name}, best, trials.policy.iterations)
-            # the term represents the excess: the parameter is within its tolerance
-            # again
+            # with the term, the parameter must be within its tolerance again
             if trial is None or not one.low <= trial.fit[one.name].value <= one.high:
                 continue
             lost = _bounded(trials, best.fit, trial.fit).cost - trial.fit.cost
@@ -245,7 +245,7 @@ def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Tri
 
 
 def _bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
-    """Fit with the rig parameters held within their tolerances."""
+    """Return a fit with the rig parameters held within their tolerances."""
     return within_tolerances(less, best, trials.rig, trials.policy)
 
 
@@ -312,8 +312,8 @@ def _without_a_name(
 
 
 def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:
-    """Return the gaps at which functions are sought: none without impacts, otherwise
-    the first ones and that of the location.
+    """Return the gaps at which functions are sought: none if there are no impacts,
+    otherwise the first gaps and the gap of the location.
     """
     problem = question.problem
     if not any(len(part.impacts.approach) for part in problem.segments):
@@ -327,8 +327,8 @@ def _needed(
 ) -> tuple[Missing | None, Needs | None]:
     """Drop functions and terms that the bootstrap samples do not retain.
 
-    **Returns:** the fit with the others, and their bootstrap results; `None` if none is
-    left or their score is not below `bic`.
+    **Returns:** the fit with the others, and their bootstrap results; `None` for both
+    if no function is left, or if the score of the fit is not below `bic`.
     """
     policy = search.policy
     while found is not None and found.functions and found.score < bic:

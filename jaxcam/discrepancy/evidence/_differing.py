@@ -44,7 +44,7 @@ class Differing(NamedTuple):
         return self.fit.cost + count * math.log(self.fit.problem.samples)
 
     def to_json(self) -> dict:
-        """Return the numbers, for a file."""
+        """Return the results as plain numbers and text, for a file."""
         pairs = zip(self.values.tolist(), self.stderr.tolist())
         return {
             "parameter": self.name,
@@ -154,7 +154,7 @@ def _split(blocks: Blocks, name: str) -> Blocks:
 
 
 def _gain(halves: Blocks, name: str) -> float:
-    """Return the gain of separate values over a common one."""
+    """Return the predicted gain of separate values compared with a common value."""
     return _best(_split(halves, name)) - _best(halves)
 
 
@@ -164,8 +164,8 @@ def _best(blocks: Blocks) -> float:
 
 
 def _foretold(halves: Blocks, name: str) -> float:
-    """Return the gain of separate values, estimated from one half of each recording and
-    used in the other.
+    """Return the gain of separate values compared with a common value, with the values
+    estimated from one half of each recording and used in the other half.
     """
     return _crossed(_split(halves, name)) - _crossed(halves)
 

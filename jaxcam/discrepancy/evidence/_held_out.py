@@ -89,7 +89,9 @@ def rms_of(fitted: Fit) -> float:
 
 
 def _square(parts: list[Residuals]) -> tuple[float, int]:
-    """Return the sum of squares in units of the noise, and the number of samples."""
+    """Return the sum of the squared residuals, in units of the noise, and the number of
+    samples.
+    """
     square = sum(float(np.sum((part.value / part.noise) ** 2)) for part in parts)
     return square, sum(len(part.value) for part in parts)
 

@@ -32,7 +32,7 @@ def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
     rig = blocks.rows(trials.rig)
     found = {}
     for term in trials.terms:
-        # the limit of a term with an inner parameter depends on that parameter
+        # skip a term with an inner parameter, on which its limit would depend
         if term.name in trial.names or term.starts():
             continue
         for one in term.strengths():

@@ -21,8 +21,8 @@ def sure(
     Terms whose strengths might be zero are dropped first, then the term that the fewest
     bootstrap samples need.
 
-    **Returns:** the fit, its result of `redrawn`, and the dropped terms with the
-    fraction of the bootstrap samples that would have retained them.
+    **Returns:** the fit, the two results of `redrawn` for this fit, and the dropped
+    terms with the fraction of the bootstrap samples that would have retained them.
     """
     doubtful: list[tuple[str, float]] = []
     while True:
@@ -99,7 +99,7 @@ def needs(
     required to retain it; the policy, a seed, and the parameters to assess (default:
     all).
     """
-    # joints between blocks belong to none of them, so blocks must be long
+    # a joint between two blocks belongs to neither of them, so blocks must be long
     pieces = max(len(flown) for flown, _ in problem.spans)
     slices = min(policy.stretches, max(1, pieces // policy.stretch_pieces))
     blocks = blocks_of(problem, found.point, slices, names)
@@ -133,7 +133,7 @@ def needs(
 
 
 def _inside(found: Fit) -> list[str]:
-    """Return the free parameters, except those at a bound, which stay there."""
+    """Return the free parameters except those at a bound, which are held there."""
     values = np.asarray(found.point.values)
     kept = []
     for name in found.free:

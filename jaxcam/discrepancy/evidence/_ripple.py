@@ -50,10 +50,10 @@ class Ripple:
     """Share of the bootstrap samples in which the ripple is significant."""
 
     def significant(self, tests: int, policy: Policy) -> bool:
-        """Return whether the ripple is significant, as one of `tests` tests, and
-        exceeds the threshold of the BIC.
+        """Return whether the gain of the ripple exceeds two thresholds: that of the
+        error rate, for one of `tests` tests, and that of the BIC.
 
-        As for any named term, this must also hold in most bootstrap samples.
+        As for any named term, it must also be significant in most bootstrap samples.
         """
         chance = chi2.isf(policy.false_alarms / tests, 2)
         asked = max(2 * math.log(self.count), chance)
@@ -119,8 +119,8 @@ def ripple_of(
 
 
 def _held_out(wave, variance) -> float:
-    """Return the gain in the log-likelihood of each recording with the ripple of all
-    others.
+    """Return the gain in the log-likelihood when each recording is predicted with the
+    ripple fitted to all others.
     """
     total = 0.0
     for k in range(len(wave)):
@@ -160,7 +160,7 @@ def _amplitudes(
     length = time[-1] * (1 + 1 / len(time))
     slow = np.arange(1, int(2 * length * policy.drive_wander * rate) + 1)
     wander = np.cos(np.pi * np.outer(time / length, slow))
-    # cosines have zero slope at both ends; the drive signal need not
+    # polynomials too, because cosines have zero slope at the ends, unlike the signal
     ends = np.polynomial.legendre.legvander(2 * time / length - 1, policy.drive_degree)
     columns = [*ends.T, *wander.T]
     found, errors = np.zeros(len(orders), dtype=complex), np.zeros(len(orders))

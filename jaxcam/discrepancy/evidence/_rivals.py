@@ -1,4 +1,4 @@
-"""Other functions in place of those found, compared by a block bootstrap."""
+"""Compare other functions with those found, by a block bootstrap."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -28,7 +28,8 @@ class Rival(NamedTuple):
 def rivals(
     found: Missing, tried: Sequence[Missing], policy: Policy, seed: int
 ) -> tuple[Rival, ...]:
-    """Return the best of the other fits, the best first, one for each set of parts.
+    """Return the best of the other fits, in order of their scores, with one fit for
+    each combination of functions and terms.
 
     The block bootstrap draws the same blocks of the recordings for all fits. No fit is
     repeated: each bootstrap sample weights the costs of the blocks.
@@ -61,7 +62,7 @@ def rivals(
 
 
 def _parts(one: Missing) -> frozenset[str]:
-    """Return the names of the terms and functions in a fit."""
+    """Return the names of the terms, functions and forms in a fit."""
     forms = {
         f"{part.label}: {getattr(getattr(part, 'primitive', None), 'name', '')}"
         for part in one.functions

@@ -97,7 +97,7 @@ class Structure:
 
     @property
     def place(self) -> str:
-        """Return the place at which the shape is largest in units of its error."""
+        """Describe the region, and where in it the shape is clearest."""
         if not len(self.grid):
             return self.region
         score = np.abs(self.value) / np.maximum(self.stderr, _TINY)
@@ -135,7 +135,7 @@ def structures(
             )
         ),
     )
-    # a force needs no separate program
+    # the gains of forces follow from `response`, without compiling a program for each
     forces = [t for t in more if t.acts == (Where.FLIGHT,) and t.coordinate == 0]
     others = [t for t in more if not any(t is force for force in forces)]
     wide = extended(problem, others, found.point)
@@ -260,7 +260,7 @@ def _vibration(
 
 
 def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
-    """Test whether residuals are autocorrelated, in more than one section."""
+    """Test whether the residuals are autocorrelated in more than one section."""
     totals, counts, cost = [], [], 0.0
     for part in residuals(found):
         value = part.value / part.noise
@@ -281,14 +281,14 @@ def _coloured(found: Fit, tests: int, policy: Policy) -> Structure:
     score = float(total) / math.sqrt(max(int(count), 1))
     bic = math.log(found.problem.samples)
     chance = float(norm.isf(policy.false_alarms / tests)) ** 2
-    # expressed as the gain of one parameter; the smooth part that the fitted states
-    # absorb is neglected
+    # the excess is expressed as the gain of one parameter; the smooth part of the
+    # residuals, which the fitted states absorb, is neglected
     return Structure(
         "coloured_residuals",
         "a smooth deviation that no shape describes",
         "flight",
         "in flight and in contact",
-        # no gain can exceed the residual cost
+        # the gain cannot exceed the cost of the residuals
         min(max(score, 0.0) ** 2, cost),
         (math.sqrt(max(chance, bic)) + policy.beyond) ** 2,
         1,

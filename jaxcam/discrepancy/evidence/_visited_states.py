@@ -31,7 +31,7 @@ class VisitedStates(NamedTuple):
     strides: Mapping[Variable, float]
 
     def ranges(self, policy: Policy):
-        """Return the ends of position, velocity and approach speed, and the
+        """Return the ranges of position, velocity and approach speed, and the
         duration.
         """
         tail = policy.velocity_tail
@@ -50,8 +50,8 @@ class VisitedStates(NamedTuple):
     ) -> Bool[np.ndarray, " k"]:
         """Return which points of a grid have enough data near them.
 
-        The minimum is a fraction `policy.visited` of the number for a uniform
-        distribution, and at least two values. Phase and time are always visited.
+        At least two values are required, and at least a fraction `policy.visited` of
+        the number for a uniform distribution. All phases and times count as visited.
         """
         values = {
             Variable.POSITION: self.position,
@@ -95,7 +95,7 @@ def visited_states(problem: Problem) -> VisitedStates:
 def _strides(problem: Problem, exists, velocity, push: float):
     """Return the changes of each variable in one integration step of fast motion.
 
-    **Arguments:** velocities, and a large acceleration.
+    **Arguments:** `velocity`: velocities of the states; `push`: a large acceleration.
     """
     step = float(np.median(np.asarray(problem.pieces.flown.step)[exists]))
     driven = all(part.drive is not None for part in problem.segments)

@@ -30,8 +30,8 @@ def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
 def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     """Return all alternatives to the chosen explanation, ranked by BIC.
 
-    These are fitted subsets, each term in addition to the chosen ones, and terms on
-    their own whose predicted gain was too small for a fit.
+    These are the other fitted subsets, and the chosen terms with each further term,
+    even if its predicted gain was too small for a fit.
     """
     best = choice.best
     found = [
@@ -42,7 +42,7 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     found += _additions(trials, choice)
     found.sort(key=lambda one: one.delta_bic)
     most = trials.policy.alternatives
-    # a single term is always listed, even if many subsets contain it
+    # a single term is always listed, however many subsets are better
     singles = [one for one in found[most:] if len(one.terms) == 1]
     return (*found[:most], *singles)
 
@@ -89,8 +89,8 @@ def _why_not(rival: Rival, policy: Policy) -> str:
 
 
 def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
-    """Return each further term in addition to the chosen ones, with its predicted
-    gain.
+    """Yield the chosen terms with each further term added, and the gain of that
+    term.
     """
     best, price = choice.best, math.log(trials.problem.samples)
     blocks = trials.blocks(best)

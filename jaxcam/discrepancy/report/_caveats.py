@@ -52,7 +52,7 @@ def caveats_of(
     """Return all caveats except the one about the verdict itself.
 
     **Arguments:** the trials, the choice, other subsets that are equally good, and
-    whether anything is named.
+    whether any effect is named.
     """
     for name, share in choice.doubtful:
         yield _in_doubt(trials, name, share)
@@ -87,7 +87,8 @@ def caveats_of(
 def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:
     """Return the caveat that a parameter differs from recording to recording.
 
-    **Arguments:** `called`: its description, if its name means nothing to a reader.
+    **Arguments:** `called`: a description of the parameter, if its name says nothing to
+    a reader.
     """
     return Caveat(
         Reason.DIFFERING,

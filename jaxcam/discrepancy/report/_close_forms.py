@@ -1,4 +1,4 @@
-"""Find parametric forms that are close to functions which no form represents."""
+"""Find the closest parametric forms of functions that no form fully represents."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,11 +9,11 @@ from ..search import Free, Hidden, Missing
 
 
 class CloseForm(NamedTuple):
-    """A form that explains a little less than a function, and its relative error."""
+    """A form that explains slightly less than the function it replaces."""
 
     fit: Fit
     form: Free
-    # relative rms error
+    # rms difference from the function, relative to its size
     error: float
 
     @property
@@ -27,7 +27,7 @@ def close_forms(
     explained: Mapping[str, float],
     small: float,
 ) -> dict[str, CloseForm]:
-    """Return the closest forms of functions that no form represents, by slot.
+    """Return the closest form of each function that no form represents, by slot.
 
     **Arguments:** the functions found; other fits, the best first; the cost that each
     function explains, by its label; and the fraction of this cost that a form may leave
@@ -46,8 +46,8 @@ def close_forms(
 
 
 def _only_form(missing: Missing, other: Missing) -> tuple[Free | None, Free | None]:
-    """Return the only function in which another fit differs, and its form there; `None`
-    twice if the fits differ in any other way.
+    """Return the only function that another fit replaces by a form, and this form;
+    `None` for both if the fits differ in any other way.
     """
     nothing = None, None
     if other.names != missing.names or len(other.functions) != len(missing.functions):

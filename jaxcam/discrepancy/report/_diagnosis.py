@@ -39,14 +39,14 @@ class Verdict(enum.StrEnum):
 
 
 class Alternative(NamedTuple):
-    """Another subset of terms, or other functions, with its difference in BIC.
+    """Another subset of terms, or other functions, with the difference in BIC.
 
     `name` joins the names of its `terms`, or is `"none"`, or gives functions by a
     formula or by their arguments; `reason` states why this alternative was not chosen.
     """
 
     name: str
-    """The names of its `terms` joined, or `"none"`."""
+    """The names of its `terms` joined, `"none"`, or a description of its functions."""
     delta_bic: float
     """BIC minus that of the chosen subset."""
     terms: tuple[str, ...]

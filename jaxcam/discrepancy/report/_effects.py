@@ -169,7 +169,7 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
 
 
 def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
-    """Return the unnamed effect of a residual structure.
+    """Return the unnamed effect that a structure of the residuals indicates.
 
     Args:
         share: The unexplained fraction of the misfit.

@@ -9,8 +9,8 @@ from ..terms import Factor, Family, Primitive, Variable, Where
 from ._words import quantity
 
 
-# In terms of the argument x: `size` of the form, its `slope` and `bend`, positions `a`
-# and `b` on the axis, lengths along it, and parameters of a phase.
+# Formulas in terms of the argument x. Their other placeholders are sizes, slopes,
+# positions, lengths and phases, which `_values` computes from the fitted parameters.
 _FORMULAS = {
     "straight": "{slope}*({x} - {low})",
     "above": "{slope}*max({x} - {a}, 0)",
@@ -82,7 +82,7 @@ _FAULTS = {
     Variable.PHASE: "as from a disturbance synchronous with the drive",
     Variable.TIME: "as from a sensor that drifts",
 }
-# an angle just below zero is not written as one just below 2 pi
+# angles that are negative by at most this (rad) are not written as just below 2 pi
 _BELOW_ZERO = 0.05
 _FACTORS = {
     Factor.VELOCITY: ("velocity", "damping"),
@@ -175,7 +175,7 @@ def _turned(angle: float) -> float:
 
 
 def _mechanism(family: Family, primitive: Primitive, numbers, values) -> str:
-    """Return the mechanism that typically has such a function."""
+    """Describe the mechanism that typically causes such a function, if one is known."""
     if family.where is Where.SENSOR and family.argument in _FAULTS:
         return f"; {_FAULTS[family.argument]}"
     if family.where is not Where.FLIGHT:

@@ -77,7 +77,7 @@ def _curve(element, along):
 
 
 def hidden_unit(element: HiddenElement, unit: str) -> str:
-    """Return the unit of the tabulated values, given that of the coordinate."""
+    """Return the unit of the tabulated values, given the unit of the coordinate."""
     return f"{unit}/s^2" if isinstance(element, Hysteresis) else "1/s^2"
 
 

@@ -38,7 +38,7 @@ _KINDS = {
 # Ratio of the errors with and without a straight line above which the line is not
 # determined
 _UNDETERMINED = 3.0
-# Points at which a function is evaluated, for each point that is kept
+# Points at which a function is evaluated, for each point of its table
 _FINER = 20
 _VERBS = {
     "force": "a force",
@@ -91,7 +91,7 @@ class MissingFunction:
 
     @property
     def slot(self) -> str:
-        """The label of its parameters in the fit; empty if it has an internal state."""
+        """Label of the function's parameters in the fit; empty for an element."""
         return self.numbers[0].rpartition("_")[0] if self.numbers else ""
 
     def to_json(self) -> dict[str, Any]:
@@ -246,7 +246,7 @@ def _gap_name(found: Fit, family: Family) -> str:
 
 
 def _graded(even: np.ndarray, function) -> np.ndarray:
-    """Return the same number of points, between which a function is almost linear.
+    """Return the given number of points, with a function almost linear between them.
 
     The points are equidistant along the graph of the function, with both axes scaled
     to their ranges, so that several points lie on a step.
@@ -321,7 +321,8 @@ def _unit(family: Family) -> str:
 
 
 def _words(family: Family, kind: str, along, value, error) -> str:
-    """Describe a function, and the point where it differs most from a straight line.
+    """Describe a function, and where it differs most from the part that rig parameters
+    can represent: a constant or a straight line.
 
     **Arguments:** the values along the argument; the errors of this difference.
     """
@@ -334,7 +335,7 @@ def _words(family: Family, kind: str, along, value, error) -> str:
         what = f"a stiffness that depends on the {family.argument}"
     else:
         what = f"{_VERBS[kind]} that depends on the {of}"
-    # a part that the rig parameters can represent has no location
+    # the part that rig parameters can represent cannot be located
     level = _level(family, along, value)
     sure = np.abs(level) > 2 * error
     k = int(np.argmax(np.where(sure, np.abs(level), -1.0)))

@@ -10,7 +10,7 @@ def spelled(name: str) -> str:
     """Return the name of one or several terms as words, with capitals in the names of
     people.
     """
-    # a plus sign also occurs in the formulas and numbers of a name
+    # only between words: formulas and numbers in a name also contain plus signs
     words = re.sub(r"(?<=[a-z])\+(?=[a-z])", " + ", str(name)).replace("_", " ")
     for one in _PROPER:
         words = words.replace(one, one.capitalize())
@@ -37,7 +37,7 @@ def number(value: float, stderr: float, unit: str) -> str:
 
 
 def ratio(value: float) -> str:
-    """Return a ratio with two significant digits, and without an exponent."""
+    """Return a ratio with at least two significant digits, and without an exponent."""
     return f"{value:.2g}" if value < 100 else f"{value:.0f}"
 
 

@@ -136,7 +136,7 @@ def _of_functions(
     needs: Needs,
     ripple: Ripple | None,
 ) -> Diagnosis:
-    """Return the diagnosis if unnamed functions were found."""
+    """Return the diagnosis of a choice that contains unnamed functions."""
     policy, held, found = trials.policy, choice.held, missing.fit
     positions, velocities, _, _ = visited_states(question.problem).ranges(policy)
     bare = choice.before
@@ -198,7 +198,7 @@ def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[C
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
     """Return caveats if the functions leave a residual, do not predict the held-out
-    data, or explain no more than others do.
+    data, or explain no more than other functions do.
     """
     left, held = missing.fit, choice.held
     for rival in choice.rivals:
@@ -235,7 +235,7 @@ def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[C
 def _rig_values(
     question: Question, fitted: Fit, deviation: Mapping[str, float]
 ) -> dict[str, Value]:
-    """Return the fitted parameters of the system, as reported."""
+    """Return the fitted parameters of the system as they are reported."""
     found = {}
     for one in fitted.estimates:
         if one.name not in question.rig:
@@ -253,7 +253,9 @@ def _rig_values(
 def _pulls(
     question: Question, within: Fit, best: Fit
 ) -> dict[str, tuple[float, float]]:
-    """Return the distances of parameters from nominal, without and with the terms."""
+    """Return the deviations of parameters from nominal, in units of their tolerances:
+    without and with the terms.
+    """
     found, problem = {}, question.problem
     for name in question.rig:
         place = problem.names.index(name)

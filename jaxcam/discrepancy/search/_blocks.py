@@ -65,8 +65,8 @@ class Blocks:
 def blocks_of(
     problem: Problem, point: Point, slices: int = 1, names: Sequence[str] | None = None
 ) -> Blocks:
-    """Return score and information of parameters about a point, in sections of each
-    recording.
+    """Return the score and the information of parameters about a point, for sections of
+    each recording.
     """
     columns = free_columns(problem, names)
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)

@@ -33,12 +33,12 @@ class Start(NamedTuple):
 
 
 class CurveLikelihood(NamedTuple):
-    """The likelihood of a function of a family about its fit, with all other free
+    """The likelihood of a function about its fitted coefficients, with all other free
     parameters eliminated.
 
     A function with coefficients c reduces the cost, divided by the cost per sample, by
     `2 c @ slope - c @ information @ c`. `gain`: this reduction for the fitted function;
-    `freedom`: the price of its coefficients; `price`: that of a parameter.
+    `freedom`: the price of its coefficients; `price`: that of one parameter of a form.
     """
 
     family: Family

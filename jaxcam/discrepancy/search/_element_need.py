@@ -14,7 +14,8 @@ from ._slots import filled
 class ElementNeed:
     """Compares the predicted gains of elements with those of functions.
 
-    No element is fitted: a scan takes seconds, a search with elements minutes.
+    No element is fitted, because a scan takes seconds, whereas a search with elements
+    takes minutes.
 
     **Arguments:** the fits of subsets, the position that drives an element (`None` if
     elements are not tried, or are candidates anyway), and the policy.
@@ -24,7 +25,8 @@ class ElementNeed:
         self.fits, self.driven, self.policy = fits, driven, policy
         # whether an element is predicted to gain more than any function or term
         self.preferred = False
-        # whether its predicted gain exceeds `promising` times the best of those
+        # whether that gain exceeds `policy.promising` times the largest gain of a
+        # function or term
         self.comparable = False
 
     def compare(

@@ -72,7 +72,8 @@ def extended(
 
 
 def with_states(problem: Problem, found: Fit, weights: Weights, policy: Policy) -> Fit:
-    """Return the fit with its states refitted to other data, for a test.
+    """Return the fit with its states refitted to other data, on which its parameters
+    are tested.
 
     The parameters keep their values. They are formally free, with a scale of zero, so
     that the compiled programs of the fit are reused.

@@ -51,7 +51,7 @@ def formulated(
 class _Trials:
     """Fits of forms in place of one of the functions of a fit.
 
-    `sound`: the fits with finite evidence and parameters that make sense.
+    `sound`: the fits with finite evidence and valid parameters.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ def _in_slot(found: Missing, slot: str):
 
 
 def _sound(trial: Missing, one: Free) -> bool:
-    """Return whether a form has finite evidence and parameters that make sense."""
+    """Return whether a form has finite evidence and valid parameters."""
     form = _in_slot(trial, one.slot)
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
@@ -138,7 +138,7 @@ def _sound(trial: Missing, one: Free) -> bool:
 
 
 def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
-    """Return whether the cost of a fit is that of the noise.
+    """Return whether the cost of a fit is no larger than the noise explains.
 
     **Arguments:** `small`: the tolerated residual; a fraction `Policy.enough` of it is
     treated as noise.
@@ -170,7 +170,7 @@ def _fitted(
     point = found.fit.point._replace(values=values)
     beaten = max(fits.policy.outdone * found.fit.cost, found.fit.cost + small)
     if shows_apart(one.family):
-        # with disconnected pieces the fit is almost linear
+        # with disconnected pieces, the fit is an almost linear problem
         subset = Subset(apart, functions, found.names)
         first = fits.fitted(subset, point, beaten=beaten)
         if not first.fit.cost < beaten:

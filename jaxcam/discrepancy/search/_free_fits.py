@@ -44,7 +44,7 @@ class Missing(NamedTuple):
 
 
 class Subset(NamedTuple):
-    """A subset to fit: functions, and names of terms, in a problem."""
+    """Functions, and names of terms, to be fitted together in a problem."""
 
     problem: Problem
     functions: tuple[Part, ...]
@@ -89,7 +89,7 @@ class FreeFits:
         """
         policy, functions = self.policy, subset.functions
         heat, point, found = 1.0, start, None
-        # the parameters of a hidden element converge step by step
+        # in each fit, the parameters of a hidden element can change by a limited step
         hidden = any(isinstance(one, Hidden) for one in functions)
         turns = policy.heats + (policy.recentred if hidden else 0)
         for turn in range(turns):
@@ -136,7 +136,7 @@ class FreeFits:
         return stop
 
     def quadratic(self, subset: Subset, point: Point, heat: float, one: Free):
-        """Return the likelihood about a point for one function, without its own prior.
+        """Return the quadratic likelihood about a point without one function's prior.
 
         **Returns:** information and score, with the coefficients of that function in
         their own units, the rows of all free parameters, and the rows of the function.
@@ -151,8 +151,8 @@ class FreeFits:
         return information, score, blocks.rows(free), blocks.rows(one.coefficients)
 
     def _rougher(self, subset, functions, point, heat) -> tuple[Part, ...]:
-        """Return the functions with the smoothness, and the hidden elements with the
-        parameters, suggested by a fit.
+        """Return the functions with the smoothness that a fit suggests, and the hidden
+        elements with the parameters that it suggests.
         """
         found = []
         for one in functions:
@@ -267,7 +267,7 @@ class FreeFits:
 
 
 def _known(information, blocks, one: Part) -> None:
-    """Add the prior of the coefficients of a function."""
+    """Add the prior of the coefficients of a function to the information."""
     if isinstance(one, Free) and one.smooth:
         rows = blocks.rows(one.coefficients)
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
@@ -275,7 +275,7 @@ def _known(information, blocks, one: Part) -> None:
 
 
 def heat_of(found: Fit) -> float:
-    """Return the cost per sample, at least one."""
+    """Return the cost per sample of a fit, or one if that is larger."""
     return max(1.0, found.cost / found.problem.samples)
 
 
@@ -293,8 +293,8 @@ def heated(problem: Problem, heat: float) -> Problem:
 
 
 def unscaled(blocks, names, heat: float):
-    """Return information and score with some parameters in their own units, divided by
-    the cost per sample (`heat`).
+    """Return information and score, divided by the cost per sample (`heat`), with the
+    parameters `names` in their own units.
     """
     information, score = (x / heat for x in blocks.total())
     unit = np.ones(len(blocks.names))

@@ -72,7 +72,7 @@ class FreeSearch:
         room, left = (driven, None) if elements else (None, driven)
         self.need = ElementNeed(self.fits, left, policy)
         self.problem = roomy(problem, self.families[0], gaps, room)
-        # gain, offset and lag of a sensor are not unnamed functions
+        # unnamed functions must not represent the gain, offset and lag of a sensor
         faults = own_faults(self.problem.model, self.problem.parameters)
         self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
@@ -104,11 +104,12 @@ class FreeSearch:
         found = simplified(self.fits, self.problem, found, self.progress)
         curve, found = found, self._formulated(found)
         if self._lacks(found, whole):
-            # no form makes up for the functions or terms that were left out
+            # forms do not make up for the parts left out: start from the complete fit
             curve, found = whole, self._formulated(whole)
         if len(found.functions) > 1 or found.names:
             return found
-        # a form may score a little worse than its curve: the better score counts
+        # a form may score slightly worse than the free function that it replaces, so
+        # the better of both scores counts
         best = min(curve.score, found.score)
         for lead in self._others():
             if leaves_noise(self.fits, found, self._small(found)) or self.clock.over:
@@ -172,9 +173,10 @@ class FreeSearch:
     def lacks_element(self, found: Missing | None) -> bool:
         """Return whether to repeat the search with elements among the candidates.
 
-        This is so if an element is preferred to every function, or if it may explain
-        a residual that the functions leave. If model errors are allowed for, a residual
-        always remains, and elements are tried only if the functions explain little.
+        This is the case if an element is preferred to every function, or if it may
+        explain a residual that the functions leave. If model errors are allowed for, a
+        residual always remains, and elements are tried only if the functions explain
+        little.
         """
         if self.need.preferred or not self.falls_short(found):
             return self.need.preferred
@@ -205,7 +207,7 @@ class FreeSearch:
         problem = self.apart if apart else self.problem
         while len(found.functions) + len(found.names) < self.policy.most_terms:
             if apart and heat_of(found.fit) < self.policy.as_noise:
-                # individual pieces contain little information on small effects
+                # single pieces of flight contain little information on small effects
                 break
             leads = self._leads(problem, found, apart)
             if self.first is None:
@@ -253,11 +255,11 @@ class FreeSearch:
         return leaves_noise(self.fits, best) and not close
 
     def _small(self, found: Missing) -> float:
-        """Return the gain that may remain, given the gain explained so far."""
+        """Return the gain that may remain unused, given the gain of the fit so far."""
         return self.policy.small * max(self.cost - found.fit.cost, 0.0)
 
     def _least(self) -> float:
-        """Return the required increase in twice the logarithm of the evidence."""
+        """Return the increase in twice the log-evidence that an addition requires."""
         tests = len(self.families) + len(self.terms) + len(KINDS)
         chance = self.policy.false_alarms / tests
         least = max(float(chi2.isf(chance, 1)), math.log(self.problem.samples))
@@ -321,9 +323,8 @@ class FreeSearch:
         return found
 
     def _rival(self, found: Missing, out: Part | str) -> str | None:
-        """Return the best term to replace a function, if it is good enough.
-
-        This uses the quadratic likelihood about the fit.
+        """Return the name of the term that best replaces a function or term; `None` if
+        no term is good enough, according to the quadratic likelihood about the fit.
         """
         names = [t.name for t in self.terms if t.name not in found.names]
         strengths = {t: [s.name for s in self._term(t).strengths()] for t in names}
@@ -342,7 +343,7 @@ class FreeSearch:
         return name if left < allowed + self._small(found) else None
 
     def without(self, found: Missing, label: str) -> Missing:
-        """Return the fit without the function or term of a label."""
+        """Return the fit without the function or term that has the given label."""
         labels = {one.label: one for one in found.functions}
         return self.fits.fitted(*self.left_out.subset(found, labels.get(label, label)))
 

@@ -18,8 +18,8 @@ def gain(information, score, rows) -> float:
 
 
 def added_gain(information, score, free, new, alike: float) -> float:
-    """Return the increase in twice the log-likelihood when `new` are freed in addition
-    to `free`.
+    """Return the increase in twice the log-likelihood when the `new` parameters are
+    freed in addition to the `free` ones.
 
     If the free parameters represent a combination of the new ones so well that less
     than a fraction `alike` of the information on it remains, the gain of this
@@ -42,8 +42,8 @@ def added_gain(information, score, free, new, alike: float) -> float:
 
 
 def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
-    """Return the gain in twice the log-likelihood of recordings when `new` is estimated
-    from others.
+    """Return the gain in twice the log-likelihood of recordings when the `new`
+    parameters are estimated from other recordings.
 
     The recordings are divided into two halves, each of which predicts the other, and
     the sum of the gains is returned; the `free` parameters are fitted to either half.
@@ -77,8 +77,8 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
 
 
 def _beside(information, score, free, new, basis):
-    """Return information and score of combinations of `new`, with the free parameters
-    eliminated.
+    """Return information and score of combinations of the `new` parameters, with the
+    `free` parameters eliminated.
     """
     free = free[np.diag(information)[free] > 0]
     inverse = invert_information(information[np.ix_(free, free)])

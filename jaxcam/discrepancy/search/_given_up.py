@@ -16,7 +16,7 @@ def given_up(
     beaten: float = math.inf,
     decides: float = -math.inf,
 ) -> Callable[[Sequence[float]], bool]:
-    """Return the callback by which `jaxcam.fitting.fit` is stopped.
+    """Return a callback that tells `jaxcam.fitting.fit` when to stop.
 
     A fit is late if its cost is still above a given value after a number of attempts.
     It crawls if it explains little and its last steps took many attempts and gained

@@ -36,7 +36,7 @@ class Number:
         return min(max(new, self.low), self.high)
 
     def near(self, value: float, change):
-        """Return the parameter after a small change, which can be differentiated."""
+        """Return the parameter after a small change, as a differentiable function."""
         return value * jnp.exp(change) if self.logarithm else value + change
 
     def change(self, old: float, new: float) -> float:
@@ -58,7 +58,8 @@ class Kind:
     """A kind of element.
 
     - `name`: its name in sentences; `element`: the function that creates an element
-      from its parameters; `numbers`: its parameters; `outputs`: names of its strengths.
+      from its parameters; `numbers`: its parameters; `outputs`: names of its strengths;
+      `starts`: number of its free motions, which depend on the initial state.
     - `signals(driven, cells)`: returns, for each set of parameters, the outputs `(r, n,
       o)` and free motions `(r, n, s)`.
     """

@@ -34,7 +34,7 @@ _TIMES = 1.25
 # parameters
 _LIMITS = tuple(np.geomspace(0.03, 1.5, 12).tolist())
 _SHAPES = ((0.5, 1.0), (1.0, 1.0), (0.5, 2.0), (1.0, 2.0))
-# The same for a stiffening hysteretic element
+# The limits and other parameters of a stiffening hysteretic element
 _STIFFENING_LIMITS = tuple(np.geomspace(0.1, 10, 12).tolist())
 _STIFFENING_SHAPES = ((-0.3, 1.0), (-2.0, 1.0), (-0.3, 2.0), (-2.0, 2.0))
 # Maximum number of force values at nodes that are computed at once
@@ -91,7 +91,7 @@ def promises(
 
 
 def _grids(problem: Problem, driven: Driven, policy: Policy):
-    """Return the kinds of elements, each with the parameters that are tried."""
+    """Yield the kinds of elements, each with the sets of parameters to try (cells)."""
     frequency = scanned_frequencies(problem, policy)
     if len(frequency):
         low, high = frequency[0], frequency[-1]
@@ -120,7 +120,8 @@ def _grids(problem: Problem, driven: Driven, policy: Policy):
 class _Chain:
     """The pieces of all recordings, prepared for forces given at their nodes.
 
-    The direct parts of a force are among the free parameters.
+    The direct parts of a force (a constant, and parts proportional to deflection and
+    velocity) are among the free parameters.
 
     **Arguments:** the problem, its `Response` about a fit, and the position that drives
     elements.
@@ -133,8 +134,8 @@ class _Chain:
         self.size = len(response.prior) + DIRECT
 
     def gains(self, kind: Kind, cells: Sequence[Sequence[float]]):
-        """Return the gains of some cells, with strengths, starts and direct parts of
-        each.
+        """Return the gains of some cells, and for each cell the strengths, the initial
+        states and the direct parts.
         """
         columns = list(_columns(kind, cells, self.driven, self.response))
         shared = len(kind.outputs)
@@ -173,14 +174,14 @@ class _Chain:
         left = pull - taken @ score
         matrix = own - taken @ np.swapaxes(across, 1, 2)
         diagonal = np.einsum("wii->wi", matrix)
-        # a force that acts like the free parameters, or not at all, has no strength
+        # a force that acts like the free parameters, or not at all, gets zero strength
         apart = diagonal > _ALIKE * np.einsum("wii->wi", own) + TINY
         scale = np.where(apart, 1 / np.sqrt(np.where(apart, diagonal, 1.0)), 0.0)
         matrix = matrix * scale[:, :, None] * scale[:, None, :]
         matrix = matrix + _FORCES * np.eye(matrix.shape[-1])
         solved = np.linalg.solve(matrix, (left * scale)[..., None])[..., 0]
         gains = np.sum(left * scale * solved, axis=-1)
-        # the direct parts contribute to the gain
+        # the gain includes that of the direct parts
         base = score @ inside @ score
         few = invert_information(information[:free, :free])
         few = np.where(np.isfinite(few), few, 0.0)
@@ -195,8 +196,8 @@ class _Chain:
 
 
 def _columns(kind: Kind, cells, driven: Driven, response: Response):
-    """Return, for each recording, the forces of unit strengths at its nodes, `(k, l,
-    cells, p)`.
+    """Return, for each recording, the forces at its nodes if all strengths are one,
+    `(k, l, cells, p)`.
     """
     each = kind.signals(driven, cells)
     times = response.time
@@ -208,8 +209,8 @@ def _columns(kind: Kind, cells, driven: Driven, response: Response):
 
 
 class _Sums:
-    """Information and score of the parameters and of the forces in cells, for one
-    recording.
+    """Information and score of the parameters and of the forces of all grid cells, for
+    one recording.
 
     `pp` and `p` are information and score of the parameters; `pf` `(m, cells, p)`
     couples the parameters to the forces; `f` `(cells, p)` and `ff` `(cells, p, p)` are
@@ -224,7 +225,9 @@ class _Sums:
         self.ff = np.zeros((cells, width, width))
 
     def add(self, direct, pushed, off, sign):
-        """Add the rows for the parameters and the forces, and the residuals."""
+        """Add rows: their derivatives with respect to the parameters (`direct`) and the
+        forces (`pushed`), and their residuals (`off`).
+        """
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * (direct.T @ pushed).reshape(-1, *self.shape)
@@ -249,7 +252,7 @@ def _summed(response: Response, r: int, direct, columns, cells: int) -> _Sums:
         forces = columns[k].reshape(columns.shape[1], -1)
         inner, slope = found.information[k], found.slope[k]
         l = slice(n + m, None)
-        # state and parameters, direct parts, and forces
+        # treat the direct parts as parameters, in addition to those of the problem
         side = inner[:, l] @ direct[k]
         known = np.block(
             [

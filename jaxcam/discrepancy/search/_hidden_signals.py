@@ -24,9 +24,8 @@ class Driven:
     """The measured position of each recording at equidistant times.
 
     `position` `(r, n)`, the last value repeated if a recording is shorter than others;
-    `begin`, `interval` `(r,)`; `spread`: largest distance of the positions from their
-    `middle`;
-    `motion_unit`: unit of the position.
+    `begin`, `interval` `(r,)`: start and step of the times; `spread`: largest distance
+    of the positions from their `middle`; `motion_unit`: unit of the position.
     """
 
     position: Float[np.ndarray, "r n"]
@@ -95,7 +94,7 @@ def resonance_signals(driven: Driven, frequency: float, ratio: float):
     filtered, free = [], []
     for position, interval in zip(driven.position, driven.interval):
         y = _first_order(position, pole, interval)
-        # up to a factor, the imaginary part of y is z, and that of its rate is z'
+        # up to a factor, z and z' are the imaginary parts of y and of `pole * y`
         filtered.append(np.stack([y.imag, (pole * y).imag], axis=-1) / (w * root))
         wave = np.exp(pole * interval * np.arange(len(position)))
         free.append(np.stack([wave.real, wave.imag], axis=-1))

@@ -28,7 +28,7 @@ from ._hidden_signals import Driven
 
 # Step of the parameters of an element, for the derivatives of its force
 _STEP = 1e-3
-# Largest free motion, in multiples of the usual force
+# Largest expected force of a free motion, in multiples of the rms force
 _LARGEST_START = 5.0
 
 
@@ -85,7 +85,7 @@ class Hidden:
 
     @property
     def coefficients(self) -> list[str]:
-        """Return the names of its own parameters."""
+        """Return the names of all parameters of the element in the fit."""
         return [
             *self.outputs,
             *self.changes,
@@ -94,14 +94,14 @@ class Hidden:
         ]
 
     def price(self, samples: int) -> float:
-        """Return the gain required for its parameters and for the grid scan."""
+        """Return the gain that the parameters of the element and the scan require."""
         shared = len(self.outputs) + len(self.changes) + len(self.direct)
         count = shared + self.starts.size
         return count * math.log(samples) + 2 * math.log(self.cells)
 
     def moved_from(self, other: "Hidden") -> float:
-        """Return the distance of its parameters from those of another element, in units
-        of the largest changes allowed in one fit.
+        """Return the distance between the parameters of two elements, in units of the
+        largest changes allowed in one fit.
         """
         return max(
             abs(number.change(a, b)) / self.kind.reach(number, other.numbers)
@@ -109,7 +109,7 @@ class Hidden:
         )
 
     def force(self, numbers: Sequence[float]) -> Float[np.ndarray, "r n"]:
-        """Return its force for other parameters and the same strengths."""
+        """Return the force of the element for other parameters but equal strengths."""
         return self._sum(*self.kind.signals(self.driven, [numbers])[0])
 
     def _sum(self, outputs, free) -> Float[np.ndarray, "r n"]:
@@ -118,8 +118,8 @@ class Hidden:
 
     @functools.cached_property
     def table(self) -> Float[np.ndarray, "r n s"]:
-        """Return its signals: outputs, derivatives of the force with respect to its
-        parameters, free motions.
+        """Return the signals of the element: its outputs, the derivatives of its force
+        with respect to its parameters, and its free motions.
         """
         cells = [list(self.numbers)]
         for k, number in enumerate(self.kind.numbers):
@@ -143,8 +143,8 @@ class Hidden:
         return self.element_at(point.values[0], names)
 
     def element_at(self, values, names: Sequence[str]) -> HiddenElement:
-        """Return the element for given values of the parameters `(q,)`; can be
-        differentiated.
+        """Return the element for given values of all parameters `(q,)`, with respect to
+        which it can be differentiated.
         """
 
         def at(name):
@@ -234,7 +234,7 @@ def hidden_place(problem: Problem) -> int:
 
 
 def started(problem: Problem, values, hidden: Hidden, direct=None) -> Array:
-    """Return parameter values with those of an element set."""
+    """Return the parameter values of a problem, with those of an element inserted."""
     new = np.array(values)
     names = problem.names
     for name, value in zip(hidden.outputs, hidden.strengths):

@@ -53,7 +53,7 @@ class KeptTrials:
         self.folder, self.mark = folder, _mark_of(problem, policy)
 
     def get(self, names: Iterable[str]) -> Ended | None:
-        """Return the end of a fit, or `None`."""
+        """Return the stored end of a fit, or `None` if there is none."""
         try:
             with (
                 self._file(names).open("rb") as stream,
@@ -70,7 +70,7 @@ class KeptTrials:
         return Ended(point, converged, iterations)
 
     def put(self, names: Iterable[str], ended: Ended) -> None:
-        """Store the end of a fit; the file is complete or absent."""
+        """Store the end of a fit; an interruption leaves no incomplete file."""
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self._file(names)
         part = file.with_suffix(f".{os.getpid()}.part")

@@ -24,8 +24,8 @@ from ._slots import filled, Free, free_term, slots_of
 class Lead(NamedTuple):
     """A candidate function, element or term, with its predicted gain.
 
-    `decoy` is the gain of a function of the same family that is reversed in time, as a
-    fraction of the gain; `None` if it was not computed.
+    `decoy` is the gain of a function of the same family that acts reversed in time, as
+    a fraction of `gain`; `None` if it was not computed.
     """
 
     gain: float
@@ -79,7 +79,7 @@ class Leads:
     def _slot(
         self, problem: Problem, found: Missing, where: Where, gap: int = 0
     ) -> str | None:
-        """Return a free slot for one more function, if there is one."""
+        """Return a free slot for one more function, or `None`."""
         used = {one.slot for one in found.functions}
         if len(used) >= self.policy.functions:
             return None
@@ -93,7 +93,7 @@ class Leads:
         if not forces and not hidden:
             return
         response = force_response(problem, found.fit.point, self.fits.free(found))
-        # one at a time: all at once would take gigabytes
+        # one family at a time, because all at once would need gigabytes of memory
         leads = [
             Lead(rough.gain, None, family, rough, slot or "")
             for family in forces
@@ -140,7 +140,8 @@ class Leads:
     ) -> Lead:
         family = lead.family
         assert family is not None
-        # reversed in time, a function of time or phase alone is still such a function
+        # a function of time or phase alone, reversed in time, is another function of
+        # the same family, and therefore no decoy
         alone = family.factor is Factor.ONE
         clock = family.argument in (Variable.TIME, Variable.PHASE)
         if (alone and clock) or not lead.gain > 0:
@@ -151,7 +152,7 @@ class Leads:
     def _elsewhere(
         self, problem: Problem, found: Missing, apart: bool
     ) -> Iterator[Lead]:
-        """Return the candidates among functions of surface, sensors and impacts."""
+        """Yield the candidates that act on the surface, on a sensor or at impacts."""
         free, heat = self.fits.free(found), heat_of(found.fit)
         # impacts contain no information if they do not connect the pieces
         places = {Where.CONTACT, Where.SENSOR, *([] if apart else [Where.IMPACT])}
@@ -188,7 +189,7 @@ class Leads:
 
 
 def decoys_of(leads: Sequence[Lead], found: Missing) -> tuple[tuple[str, float], ...]:
-    """Return labels of functions, and the gains of their decoys as fractions."""
+    """Return the labels of the functions in a fit, with the gains of their decoys."""
     labels = {one.label for one in found.functions}
     return tuple(
         (lead.label, lead.decoy)

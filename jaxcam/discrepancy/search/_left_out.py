@@ -17,8 +17,8 @@ from ._slots import emptied, filled, Part
 
 class Without(NamedTuple):
     """The quadratic likelihood without a function or term: the increase in cost if
-    nothing else changes (`worse`), information and score there, and the rows of the
-    parameters that are kept.
+    nothing else changes (`worse`), the information and the score at that point, and the
+    rows of the parameters that are kept.
     """
 
     worse: float
@@ -29,7 +29,7 @@ class Without(NamedTuple):
 
 
 class LeftOut:
-    """Fits without a function or term.
+    """Fits without one of the functions or terms that were found.
 
     **Arguments:** the fits, the candidate terms, the problem with slots for functions,
     and the policy.
@@ -69,7 +69,7 @@ class LeftOut:
         """Return the quadratic likelihood about a fit if a function or a term is left
         out.
 
-        **Arguments:** names of `more` parameters, which are zero in the fit.
+        **Arguments:** `more`: names of further parameters, which are zero in the fit.
         """
         free, kept = self.fits.free(found), self.fits.free(self.subset(found, out)[0])
         problem = filled(found.problem, found.functions)

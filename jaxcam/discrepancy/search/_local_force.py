@@ -206,7 +206,7 @@ def _chained(pieces: LinearPieces):
 
 
 def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPieces:
-    """Return the pieces with a few forces instead of one at every node."""
+    """Return the pieces with a few given forces instead of a free one at each node."""
     found = response.pieces
     keep = found.information.shape[-1] - forces.shape[-2]
     m = response.place.shape[1]
@@ -217,7 +217,7 @@ def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPie
     half = onto(found.information, forces)
     information = onto(np.swapaxes(half, -1, -2), forces)
     slope = onto(found.slope[:, :, None, :], forces)[:, :, 0]
-    # a joint is affected by the piece before it
+    # the residual of a joint depends on the forces in the piece before it
     before = np.concatenate([np.zeros_like(forces[:, :1]), forces[:, :-1]], axis=1)
     direct = np.zeros((*found.direct.shape[:-1], m + forces.shape[-1]))
     direct[..., :m] = found.direct[..., :m]

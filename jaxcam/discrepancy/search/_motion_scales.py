@@ -14,8 +14,8 @@ from ..terms import MotionScales
 def motion_scales(
     runs: Sequence[Recording], channel: str, sensor: Sensor, slip: float
 ) -> MotionScales:
-    """Return positions, speeds and accelerations of a coordinate that a channel
-    measures.
+    """Return the scales of position, speed and acceleration of the coordinate that a
+    channel measures.
 
     **Arguments:** `slip`: the speed over which dry friction changes sign.
     """

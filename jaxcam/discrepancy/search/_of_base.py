@@ -36,7 +36,7 @@ def of_base(drive: Turning | Input | None) -> Turning | Input | None:
 
 
 def within(parameter: Parameter) -> Parameter:
-    """Return the same parameter of the base of a `WithTerms`."""
+    """Return a parameter of a system, applied to the base of a `WithTerms`."""
 
     def where(model):
         return parameter.where(Model(model.system.base, model.sensors, model.drive))
@@ -45,7 +45,7 @@ def within(parameter: Parameter) -> Parameter:
 
 
 def channel_of(sensors: Mapping[str, Sensor], place: int) -> str:
-    """Return the channel that measures a component of the state, or the first one."""
+    """Return the channel that measures a state component, or else the first channel."""
     for name, sensor in sensors.items():
         if isinstance(sensor.observe, int) and sensor.observe == place:
             return name
@@ -66,5 +66,5 @@ def usual_state(
 
 
 def measured_in(unit: str, terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return the terms with the unit of the coordinate."""
+    """Return the terms with the given unit of the coordinate."""
     return tuple(dataclasses.replace(term, motion_unit=unit or "1") for term in terms)

@@ -34,7 +34,7 @@ def placing(
     This uses the quadratic likelihood about a fit, with strengths of the permitted
     sign.
 
-    **Arguments:** the problem, and the response to a force at any time, about the fit.
+    **Arguments:** the problem, and its `Response` about the fit.
     """
     strengths = term.strengths()
     linear = np.array([k for k, one in enumerate(strengths) if not one.inner])

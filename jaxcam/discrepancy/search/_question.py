@@ -93,7 +93,7 @@ def with_seen_noise(
 ) -> tuple[dict[str, Sensor], tuple[Noisier, ...]]:
     """Return the sensors with the measured noise, if it exceeds the stated noise.
 
-    If the stated noise were too small, every sensor error would look like physics.
+    If the stated noise were too small, sensor noise would look like missing physics.
     """
     found, noisier = dict(sensors), []
     for name, sensor in sensors.items():

@@ -22,7 +22,7 @@ _ALIKE = 0.9
 
 
 def recentred(fits: FreeFits, found: Missing) -> Missing:
-    """Return the fit with one function instead of two, if it has more evidence."""
+    """Return the fit with one function instead of two, if that has more evidence."""
     curves = [f for f in found.functions if isinstance(f, Free) and f.smooth]
     for one in curves:
         other = _partner(curves, one)

@@ -93,7 +93,7 @@ def _check(rig: Rig, runs: Sequence[Recording]) -> None:
         check_drive(run)
         samples = run[_FOLLOWER]
         least = float(np.min(samples))
-        # the follower cannot be below the cam by more than the tolerances
+        # the lowest angle of the follower must be near the range of those of the cam
         room = (high - low) / 2
         if least >= low - room and least <= high:
             continue

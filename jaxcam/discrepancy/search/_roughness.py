@@ -73,7 +73,7 @@ def occam(
 def occam_of(
     inside: Float[np.ndarray, "k k"], spread: Float[np.ndarray, " k"]
 ) -> float:
-    """Return the Occam factor for the information on the coefficients alone."""
+    """Return the Occam factor, given the information on the coefficients `inside`."""
     values = np.linalg.eigvalsh(inside * np.outer(spread, spread))
     return float(np.sum(np.log1p(np.maximum(values, 0.0))))
 

@@ -153,8 +153,8 @@ class Search:
         return best
 
     def _exchanges(self, best: Trial, worse: float = 0.0) -> list[frozenset[str]]:
-        """Return the subsets whose BIC, by the quadratic model about the best fit, is
-        larger by at most `worse`.
+        """Return the subsets in which one term is exchanged and whose BIC is larger by
+        less than `worse`, according to the quadratic model about the best fit.
         """
         blocks = self.trials.blocks(best)
         information, score = blocks.total()
@@ -179,7 +179,7 @@ class Search:
                 change = change + extra * math.log(self.trials.problem.samples)
                 if change < worse:
                     found.append((change, (best.names - {out}) | {term.name}))
-        # the most promising subsets; among equals, the first
+        # keep the most promising subsets; among equals, the first ones
         found.sort(key=lambda one: one[0])
         return [names for _, names in found[: self.policy.tried]]
 

@@ -1,4 +1,7 @@
-"""Free functions in a problem: their families, priors and slots."""
+"""Free functions in a problem: their families, priors and slots.
+
+A slot is a term of the problem that has no effect until a function is put into it.
+"""
 
 import dataclasses
 import math
@@ -36,7 +39,7 @@ _SUBSTEPS = 8
 # Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
 _ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
-# slots for each gap; its number is appended to the label
+# slots at each gap, whose number is appended to the labels
 _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution"), (Where.CONTACT, "surface"))
 
 
@@ -62,25 +65,25 @@ class Free:
 
     @property
     def smooth(self) -> bool:
-        """Return whether it has a smoothness prior."""
+        """Return whether the function has a smoothness prior."""
         return self.primitive is None
 
     @property
     def jumps(self) -> bool:
-        """Return whether it is a force that jumps at edges."""
+        """Return whether the function is a force that jumps at edges."""
         form = self.primitive
         return self.where is Where.FLIGHT and form is not None and form.sharp
 
     def price(self, samples: int) -> float:
-        """Return the gain required for its parameters, without the Occam factor of its
-        prior.
+        """Return the gain that the function's parameters require, without the Occam
+        factor of its prior.
         """
         count = 0 if self.primitive is None else self.primitive.count
         return count * math.log(samples)
 
     @property
     def coefficients(self) -> list[str]:
-        """Return the names of its own parameters."""
+        """Return the names of the function's parameters in the fit."""
         sines = _SINES[self.family.where] + 1
         count = self.primitive.count if self.primitive else sines
         return [f"{self.slot}_{k}" for k in range(count)]
@@ -102,8 +105,8 @@ Part: TypeAlias = Free | Hidden
 def roomy(
     problem: Problem, family: Family, gaps: Sequence[int], driven: Driven | None
 ) -> Problem:
-    """Return the problem with slots for free functions and a hidden element, all
-    without effect, and with the possible errors of any sensor.
+    """Return the problem with empty slots for free functions and a hidden element, and
+    with the possible errors of the first coordinate's sensor as parameters.
 
     One compiled program serves all contents of the slots.
 
@@ -182,7 +185,7 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
             new = eqx.tree_at(lambda t: t.coefficients, fresh, old.coefficients)
             return eqx.tree_at(lambda m: terms_of(m)[place], model, new)
 
-        # an unused slot needs a prior, so that it does not move
+        # an unused coefficient needs a prior too, so that it does not move
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
         smooth = prior and one.primitive is None
         scales = dict(zip(one.coefficients, map(float, spread)))

@@ -32,7 +32,7 @@ class StateElimination:
         self._blocks = list(blocks)
 
     def follow(self, blocks: Sequence[np.ndarray], earlier, later, rows) -> None:
-        """Continue with the next piece, which rows connect to the previous state.
+        """Continue with the next piece; `rows` connect it to the previous state.
 
         **Arguments:** the blocks of the next piece; derivatives of the rows with
         respect to the previous state and to the state of the next piece; the three
@@ -51,8 +51,8 @@ class StateElimination:
             self._taken(self._blocks, np.zeros((len(self._blocks[0]), 0)))
 
     def _taken(self, blocks, coupling):
-        """Subtract the contribution of a state, and return its coupling and its rows,
-        divided by the square root of its information.
+        """Eliminate a state: add its contribution with a negative sign, and return its
+        coupling and blocks, divided by the square root of its information.
         """
         scale = 1 / np.sqrt(np.maximum(np.diag(blocks[0]), TINY))
         scaled = blocks[0] * np.outer(scale, scale)

@@ -160,7 +160,7 @@ class SumSearch:
         return _Grid(tuple(forms), rows, numbers, seen, sizes)
 
     def _pairs(self) -> Iterator[_Sum]:
-        """Yield the best sum of every two forms on the grid."""
+        """Yield the best sum of each pair of forms on the grid."""
         grid, price = self.grid, self.likelihood.price
         told = grid.seen @ self.best
         kinds = range(len(grid.forms))
@@ -210,7 +210,7 @@ class SumSearch:
             yield _Sum(gain, (*one.parts, form), np.append(one.numbers, own))
 
     def _seen(self, form: Primitive, numbers: np.ndarray) -> np.ndarray:
-        """Return a form as a vector, or one for each of several sets of parameters."""
+        """Return a form as a vector, or as one vector for each set of parameters."""
         sines = self.likelihood.sines_of(form, np.atleast_2d(numbers))
         seen = sines @ self.root.T
         return seen if numbers.ndim > 1 else seen[0]
@@ -223,8 +223,8 @@ class SumSearch:
         return (self._seen(form, steps) - self._seen(form, numbers)).T / _STEP
 
     def _refined(self, sums: Sequence[_Sum]) -> list[_Sum]:
-        """Optimise the parameters of sums. Return the sums whose parameters make sense
-        and whose parts all count.
+        """Optimise the parameters of sums, and return the sums with valid parameters
+        whose parts are all significant.
         """
         found = []
         for one in sums:

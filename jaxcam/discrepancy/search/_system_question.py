@@ -117,7 +117,7 @@ def system_question(
     sensors, noisier = with_seen_noise(sensors, runs, policy)
     pairs = location.first(coordinates(system, usual_state(system, sensors, runs)))
     seen = channel_of(sensors, pairs[0][0])
-    # the constants of a rig are those of its first coordinate
+    # the stated constants of a rig apply only to its first coordinate
     stated = {} if location.coordinate else stated
     unit, turned = unit_of(seen), system.period is not None
     usual = References.of_speed(fast_speed(runs, seen))

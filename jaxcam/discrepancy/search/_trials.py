@@ -69,7 +69,7 @@ class Trials:
         return min((trial.fit.cost for trial in self.known.values()), default=math.inf)
 
     def hopeless(self, cost: float) -> bool:
-        """Return whether a cost is too far above the smallest one to be refined."""
+        """Return whether a fit with this cost is too far from the best to refine it."""
         return cost > self.policy.hopeless * self.least_cost
 
     def term(self, name: str) -> Term:
@@ -103,9 +103,10 @@ class Trials:
     def attempt(
         self, names: frozenset[str], start: Trial | None, iterations: int | None = None
     ) -> Trial | None:
-        """Fit a subset, starting from another fit; return its best fit so far.
+        """Fit a subset, starting from another fit, and return the best fit of the
+        subset so far.
 
-        **Arguments:** the maximum number of iterations; by default that of a first fit.
+        **Arguments:** `iterations`: maximum number; default: that of a first fit.
         """
         iterations = iterations or self.policy.quick_iterations
         found = self._left(names) or self._fitted(names, start, iterations)
@@ -159,7 +160,7 @@ class Trials:
         astray = not self._sound(start.fit)
         first, second = (nominal, ended) if astray else (ended, nominal)
         grown = names > start.names
-        # individual terms decide which pairs are tried, so they get more iterations
+        # fits of single terms decide which pairs are tried, so they continue longer
         beaten = start.fit.cost if grown and len(names) > 1 else math.inf
         # the loss without a term must be accurate if it decides whether the term stays
         decides = -math.inf
@@ -170,7 +171,7 @@ class Trials:
         if self._sound(found) or self.hopeless(found.cost):
             return found
         if astray and grown and found.cost < start.fit.cost:
-            # restarting from nominal gave the better fit
+            # the fit restarted from the nominal rig is better than the smaller subset
             return found
         again = self._fit(free, second, iterations, found.cost, decides)
         return min(found, again, key=_cost)
@@ -203,7 +204,7 @@ class Trials:
         return trial.fit.optimal or close
 
     def without(self, best: Trial, name: str) -> Trial:
-        """Return the fit of a subset with one term fewer."""
+        """Return the fit of a subset without one of its terms."""
         rest = best.names - {name}
         known = self.known.get(rest) or self.attempt(rest, best, self.policy.iterations)
         assert known is not None
@@ -218,7 +219,8 @@ class Trials:
         """Return whether the additional terms of a fit are consistent across
         recordings.
 
-        The strengths estimated from either half are tested on the other half.
+        The strengths estimated from either half of the recordings are tested on the
+        other half.
         """
         blocks = self.blocks(less)
         added = [
@@ -231,7 +233,7 @@ class Trials:
         return predicted_gain(blocks, free, blocks.rows(added), self.policy) > 0
 
     def response(self, names: frozenset[str]) -> Response:
-        """Return the response to a force at any time, about a fit."""
+        """Return the response to forces at all nodes, linearised about a fit."""
         if names not in self._responses:
             point = self.known[names].fit.point
             free = self.parameters(names)
@@ -248,7 +250,7 @@ class Trials:
         return self._scans[names]
 
     def placed(self, names: frozenset[str], term: Term) -> Placing:
-        """Return the start at which adding a term to a fit would gain most."""
+        """Return the starting values with which a term added to a fit gains most."""
         key = names, term.name
         if key not in self._placed:
             self.progress(f"searching for the position of {term.sentence}", None)
@@ -264,7 +266,7 @@ class Trials:
         return self._frequency(start)
 
     def _frequency(self, start: Trial) -> float:
-        """Return the best known initial frequency."""
+        """Return the frequency at which a vibration is predicted to gain most."""
         known = self._scans.get(start.names) or next(iter(self._scans.values()), None)
         scan = known or self.scan(start.names)
         return scan.best[0]

@@ -90,8 +90,8 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
 
 
 def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
-    """Return frequencies from a few periods in the longest recording to a few steps per
-    period.
+    """Return frequencies from a few periods in the longest recording up to the highest
+    that samples and integration steps resolve.
     """
     length = max(part.recording.duration for part in problem.segments)
     interval = max(part.recording.interval for part in problem.segments)
@@ -130,7 +130,9 @@ class _Sums:
         self.fc += np.sum(np.real(np.conj(waves) * shaken[m:]), axis=0)
 
     def add(self, direct, pushed, off, sign):
-        """Add the rows for the parameters and the force, and the residuals."""
+        """Add rows: their derivatives with respect to the parameters (`direct`) and the
+        force (`pushed`), and their residuals (`off`).
+        """
         self.pp += sign * direct.T @ direct
         self.p += sign * direct.T @ off
         self.pf += sign * direct.T @ pushed
@@ -151,8 +153,8 @@ def _summed(response: Response, r: int, rate) -> _Sums:
         waves = _waves(response.time[r, k], rate)
         shaken = inner[:, l] @ waves
         sums.add_piece(inner[n:, n:], slope[n:], waves, shaken[n:])
-        # information of the state: with itself, the parameters, the residuals and the
-        # force
+        # the blocks of the state: its information with itself and with the parameters,
+        # its score, and its information with the force
         here = [inner[:n, :n], inner[:n, p], slope[:n], shaken[:n]]
         if waves_before is None:
             states.begin(here)

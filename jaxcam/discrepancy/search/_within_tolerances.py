@@ -1,4 +1,4 @@
-"""Report the fit without the missing terms, within the tolerances of the rig."""
+"""Refit the model without the missing terms, within the tolerances of the rig."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ def within_tolerances(
     """Return the fit without terms, with the rig parameters held within their
     tolerances.
 
-    If physics is missing, the data outweigh the known rig parameters, and a fit ends at
-    unrealistic values. The report therefore compares the fit with terms to a rig within
-    its tolerances.
+    If physics is missing, the data outweigh the stated rig parameters, and the fitted
+    values become unrealistic. The report therefore compares the fit with terms to a rig
+    within its tolerances.
 
     **Arguments:** fits without and with the terms, the names of the rig parameters, and
     the policy. The bounds always include the values of the fit with terms.

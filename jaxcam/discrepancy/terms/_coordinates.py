@@ -16,13 +16,13 @@ _LOOKS = 3
 def coordinates(
     system: HybridSystem, state: Float[np.ndarray, " n"]
 ) -> tuple[tuple[int, int], ...]:
-    """Return, for each coordinate of a system, its component of the state and that of
-    its velocity.
+    """Return, for each coordinate of a system, the state components that contain the
+    coordinate and its velocity.
 
-    A component is a coordinate if its rate of change is another component, apart from a
-    function of time (as for relative positions with absolute velocities).
+    A component is a coordinate if its rate of change is another component, possibly
+    plus a function of time (as for relative positions with absolute velocities).
 
-    **Arguments:** a state near which the field is defined, shape `(n,)`.
+    **Arguments:** the system; a state `(n,)` near which its vector field is defined.
 
     **Raises:** `ValueError` if there is no coordinate.
     """

@@ -104,7 +104,7 @@ class Family:
         if self.periodic:
             return OF_PHASE
         if self.where is Where.SENSOR and self.argument is not Variable.TIME:
-            # a gain or a lag is a named term
+            # without a straight line, because gain and lag of a sensor are named terms
             return tuple(one for one in ON_A_LINE if one is not STRAIGHT)
         if self.argument in (Variable.TIME, Variable.APPROACH):
             return (*ON_A_LINE, *FROM_ZERO)
@@ -200,7 +200,7 @@ def families(
             sum(positions) / 2,
             slip,
             motion_unit,
-            # functions that are not forces are not integrated
+            # only forces are integrated; other functions have no stride
             strides.get(argument, 0.0) if where is Where.FLIGHT else 0.0,
             constraint,
         )
@@ -228,7 +228,7 @@ def families(
 
 
 _TIMELESS = (Variable.POSITION, Variable.VELOCITY)
-# left out, because a function of the argument alone is equivalent
+# combinations left out, because a function of the argument alone is equivalent
 _DOUBLED = {
     (Variable.POSITION, Factor.DEFLECTION),
     (Variable.VELOCITY, Factor.VELOCITY),

@@ -47,9 +47,10 @@ def _numbers(values) -> tuple[Array, ...]:
 
 
 def _shares(knots, reach):
-    """Return the weights `(n, n)` of the knots that average over an integration step.
+    """Return weights `(n, n)` that average values at knots over an integration step.
 
-    **Arguments:** the distance within which knots have a weight, if not zero.
+    **Arguments:** the knots, and the distance at which the weights vanish; zero for no
+    averaging.
     """
     reach = jax.lax.stop_gradient(reach)
     apart = jnp.abs(knots[:, None] - knots[None])
@@ -59,12 +60,12 @@ def _shares(knots, reach):
 
 
 def _knots(low, high):
-    """Return where the spline begins, and the spacing of its knots."""
+    """Return the start of the spline and the spacing of its knots."""
     width = high - low
     return low - _BEYOND * width, width * (1 + 2 * _BEYOND) / (_KNOTS - 3)
 
 
-# compiled by themselves, so that they are traced once for all functions of a program
+# compiled separately, so that it is traced once for all functions of a program
 @jax.jit
 def _splines(numbers, forms, waves, ends, jumping, stride):
     """Return the coefficients of the spline, those for its derivatives if they differ
@@ -107,13 +108,13 @@ def _splines(numbers, forms, waves, ends, jumping, stride):
     # without any form, the function is a sum of sines
     alone = (jnp.arange(MOST_PARTS) == 0).astype(int)
     which = jnp.where(forms > 0, forms.astype(int) + 1, alone)
-    # in a loop, the forms are compiled once
+    # in a loop, each form is compiled once instead of once per part
     total, _ = jax.lax.scan(add, nothing(None), (which, _divided(numbers, forms)))
     return total
 
 
 def _divided(numbers, forms) -> Float[Array, "m p"]:
-    """Return the parameters of each of several forms, those of one after another."""
+    """Return the parameters of each form, which follow one another in `numbers`."""
     counts = jnp.array([0, *(one.count for one in PRIMITIVES)])[forms.astype(int)]
     first = jnp.cumsum(counts) - counts
     every = jnp.pad(jnp.stack(numbers), (0, MOST_NUMBERS))
@@ -181,7 +182,7 @@ class FreeFunction(Term):
 
         A sine is interpolated at equidistant knots by B-splines whose coefficients are
         its values there divided by `(2 + cos(rate * spacing)) / 3`. The values of a
-        form are the coefficients themselves, which smooths its edges over one knot.
+        form are used as coefficients directly, which smooths its edges over one knot.
         A second spline, of which only the derivatives are used, smooths jumps over an
         integration step: otherwise the derivative with respect to the place of an edge
         is zero in most steps, and much too large in the others.
@@ -202,7 +203,7 @@ class FreeFunction(Term):
         )
 
     def exact(self):
-        """Return the function with the derivatives of its values."""
+        """Return the function with exact derivatives, not averaged over a step."""
         return eqx.tree_at(
             lambda f: (f.stride, f.softened),
             self,
@@ -221,7 +222,7 @@ class FreeFunction(Term):
         """Return a member of a family with given coefficients of its sines and its
         jump.
 
-        With a `primitive`, the first of them are its parameters.
+        With a `primitive`, the first coefficients are its parameters.
         """
         rates, shifts = family.waves(len(coefficients) - 1)
 
@@ -267,7 +268,7 @@ class FreeFunction(Term):
         return self._spline(argument) * turned + self.jump * direction
 
     def _spline(self, argument):
-        """Evaluate the spline, with the derivatives of the softened one."""
+        """Return the value of the spline with the derivatives of the softened one."""
         assert self.table is not None
         width = self.high - self.low
         start, spacing = _knots(self.low, self.high)
@@ -299,7 +300,7 @@ class FreeFunction(Term):
 
 
 class FreeForce(FreeFunction):
-    """An acceleration."""
+    """A free function that, times its factor, is added to the acceleration."""
 
     name: ClassVar[str] = "free_force"
 
@@ -313,7 +314,7 @@ class FreeForce(FreeFunction):
 
 
 class FreeRestitution(FreeFunction):
-    """A factor on the coefficient of restitution, `exp` of the function."""
+    """A free function whose exponential multiplies the coefficient of restitution."""
 
     name: ClassVar[str] = "free_restitution"
 
@@ -322,7 +323,7 @@ class FreeRestitution(FreeFunction):
 
 
 class FreeSurface(FreeFunction):
-    """A correction to the height of the surface."""
+    """A free function added to the height of the surface."""
 
     name: ClassVar[str] = "free_surface"
 

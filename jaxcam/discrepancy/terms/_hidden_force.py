@@ -99,7 +99,7 @@ class HiddenForce(Term):
         place = (motion.t - self.begin[row]) / self.interval[row]
         last = self.table.shape[1] - 4
         first = jnp.clip(jnp.floor(place) - 1, 0, last)
-        # a cubic through four samples
+        # interpolate by the cubic through four samples
         u = jnp.clip(place - first, 0.0, 3.0)
         near = jax.lax.dynamic_slice(
             self.table, (row, first.astype(int), 0), (1, 4, SHARED + STARTS)

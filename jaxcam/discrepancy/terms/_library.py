@@ -35,12 +35,12 @@ from ._with_terms import WithTerms
 
 
 def _reference(default: float):
-    """Declare a constant of a term that is not fitted; a saved file may omit it."""
+    """Declare a constant of a term: it is not fitted, and a saved file may omit it."""
     return eqx.field(default=default, static=True, metadata={"spare": True})
 
 
-# Applied forces in units of the dry friction: up to the first, friction balances them
-# exactly; the balance fades over the second; the third is far beyond both
+# In units of the dry friction: the largest applied force that is balanced exactly, the
+# range beyond 1 over which the balance fades, and the force assumed without friction
 _HELD, _FADE, _MANY = 0.99, 0.5, 1e3
 
 
@@ -79,7 +79,7 @@ class CoulombFriction(Term):
     def acceleration(self, motion: Motion):
         share = _share_of(motion.pushed, self.fc)
         size = jnp.abs(share)
-        # if the force exceeds the friction, the velocity of the body reverses smoothly
+        # beyond the friction, the balance fades, so that a body reverses smoothly
         held = jnp.where(size < 1, size, jnp.clip((1 + _FADE - size) / _FADE, 0.0, 1.0))
         balance = jnp.sign(share) * jnp.arctanh(jnp.minimum(held, _HELD))
         return -self.fc * jnp.tanh(motion.velocity / self.slip + balance)

@@ -1,4 +1,4 @@
-"""Where in a system missing physics is sought: a coordinate and a gap."""
+"""Locations in a system at which missing physics is sought: coordinates and gaps."""
 
 import dataclasses
 from typing import NamedTuple
@@ -23,13 +23,16 @@ class Location(NamedTuple):
         return tuple(pairs[k] for k in self._order(len(pairs)))
 
     def of_library(self, term: Term) -> Term:
-        """Return a term of the library at this location; forces and sensor errors
-        belong to the first coordinate.
+        """Return a term of the library at this location.
+
+        Only its gap is set: forces and sensor errors act on the first coordinate, which
+        `first` makes that of the location.
         """
         return dataclasses.replace(term, constraint=self.constraint)
 
     def reordered(self, term: Term, coordinates: int) -> Term:
-        """Return a user's term with the index of its coordinate in the new order.
+        """Return a user's term with the index that its coordinate has in the order of
+        `first`.
 
         **Raises:** `ValueError` if there is no such coordinate.
         """
@@ -48,8 +51,8 @@ class Location(NamedTuple):
     def said(
         self, system: HybridSystem, pairs: tuple[tuple[int, int], ...]
     ) -> tuple[str, str]:
-        """Return the names of the coordinate and of the gap; if they have none, their
-        indices.
+        """Return the names of the coordinate and of the gap, or their indices if they
+        have no names.
         """
         states, place = system.state_names, pairs[self.coordinate][0]
         coordinate = (

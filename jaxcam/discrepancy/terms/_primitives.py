@@ -32,7 +32,7 @@ class Place(NamedTuple):
 
     @classmethod
     def between(cls, argument, low, high):
-        """Return an argument in the scales of a range."""
+        """Return the place of an argument relative to a range."""
         width = high - low
         return cls(argument, (argument - low) / width, argument / width)
 
@@ -53,12 +53,12 @@ class Primitive(NamedTuple):
     - `places`: the parameters that are positions, as fractions of the range; if there
       are two, the first is the lower one.
     - `positive`: the parameters that are lengths or exponents.
-    - `ends`: further positions, as a function of the parameters.
+    - `ends`: further positions within the range, as a function of the parameters.
     - `apart`: for a form whose value or slope jumps at edges, the distance between them
         as a fraction of the range, as a function of the parameters.
     - `sharp`: whether its value jumps there.
-    - `special`: the form that it is for an exponent of one, its last parameter.
-    - `parts`: the forms of which it is the sum, if it is one.
+    - `special`: the same form for an exponent (its last parameter) of one.
+    - `parts`: the forms that are added; empty unless the form is a sum.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Primitive(NamedTuple):
         return divided
 
     def within(self, numbers) -> bool:
-        """Return whether the positions lie in the range of the argument, in their
+        """Return whether the positions lie in the range of the argument, in ascending
         order, and lengths and exponents are positive.
         """
         if self.parts:
@@ -142,13 +142,13 @@ def _step(at: Place, x):
 
 
 def _power(at: Place, x, exponent):
-    """Return `max(x, 0)**exponent`, with derivatives at zero."""
+    """Return `max(x, 0)**exponent`, with finite derivatives at zero."""
     seen = x > _LEAST
     return at.xp.where(seen, at.xp.where(seen, x, 1.0) ** exponent, 0.0)
 
 
 def _beyond(at: Place, x, width):
-    """Return how far `x` is from an interval of some half-width about zero."""
+    """Return the signed distance of `x` from the interval from -width to width."""
     inside = at.xp.where(x < -width, -width, x)
     return x - at.xp.where(x > width, width, inside)
 
@@ -280,7 +280,7 @@ FAST = Primitive(
     (_shares(0.02, 0.46, 23),),
     (0.05,),
     odd=True,
-    # velocities to either side
+    # width of the range between the thresholds of both directions
     ends=lambda p: (2 * p[1],),
 )
 POWER_OF_SPEED = Primitive(
@@ -341,7 +341,7 @@ ON_A_LINE = (
 )
 FROM_ZERO = (POWER,)
 OF_SPEED = (FORWARD, FALLING, FAST, POWER_OF_SPEED)
-# alone, it is a named term
+# dry friction alone is a named term
 ONLY_IN_SUMS = (DRY,)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
 

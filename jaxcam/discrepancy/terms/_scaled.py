@@ -16,7 +16,7 @@ class ScaledTerm(Term):
     parameter in `_ends`.
     """
 
-    # plain numbers, as stored in a saved system
+    # the scales as plain numbers, which a saved system can store
     ranges: tuple[float, ...] = eqx.field(
         default=tuple(MotionScales()),
         static=True,
@@ -54,7 +54,7 @@ class ScaledTerm(Term):
         return super().strengths()
 
     def _sizes(self) -> dict[str, float]:
-        """Return significant changes of the strengths."""
+        """Return the size of a significant change of each strength."""
         return {}
 
     def _ends(self) -> dict[str, tuple[float, float]]:

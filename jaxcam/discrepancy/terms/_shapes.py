@@ -19,7 +19,8 @@ from ._term import Motion, Term, terms_of
 from ._where import Where
 
 
-# Just inside the ends, so that the angle of a Chebyshev polynomial is differentiable
+# Limit of the scaled variable, just inside its ends at +-1, where the angle of a
+# Chebyshev polynomial is not differentiable
 _END = 1 - 1e-12
 
 
@@ -94,7 +95,7 @@ class Polynomial(Shape):
     def basis(self, quantity) -> Array:
         middle, half = (self.high + self.low) / 2, (self.high - self.low) / 2
         x = jnp.clip((quantity - middle) / half, -_END, _END)
-        # all at once, because a recurrence would be compiled degree by degree
+        # all degrees at once, because a recurrence would be compiled degree by degree
         last = self.first + len(self.coefficients)
         degrees = jnp.arange(self.first, last, dtype=float)
         return jnp.cos(degrees * jnp.arccos(x))
@@ -319,7 +320,7 @@ def shapes(
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
         RestitutionOfSpeed(zeros(RestitutionOfSpeed), *approach),
         RestitutionOfTime(zeros(RestitutionOfTime), 0.0, duration),
-        # a constant is an offset; a part proportional to the position is a gain error
+        # no degrees 0 and 1, which are an offset and a gain error of the sensor
         SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
         SensorOfTime(zeros(SensorOfTime), 0.0, duration),
     ]

@@ -49,7 +49,7 @@ class LinearSpring(ScaledTerm):
 
 
 class _WithEdge(ScaledTerm):
-    """A force that begins at a position.
+    """A force that acts only on one side of a position, its edge or knee.
 
     `viscous` strengths multiply a velocity; `dry` strengths are forces.
     """
@@ -63,7 +63,7 @@ class _WithEdge(ScaledTerm):
 
     @property
     def _edge(self) -> str:
-        """Name of the inner parameter."""
+        """Name of the inner parameter: the position of the edge or knee."""
         return next(one.name for one in self._declared() if one.inner)
 
     def _stiff(self) -> float:

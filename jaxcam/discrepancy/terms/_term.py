@@ -14,7 +14,7 @@ from ._value import Value
 from ._where import Where
 
 
-# The methods by which a term acts, and where
+# The methods through which a term acts, with the part of the model in which each acts
 _METHODS = {
     "acceleration": Where.FLIGHT,
     "contact": Where.CONTACT,
@@ -293,7 +293,7 @@ class SensorTerm(Term):
 
 
 def terms_of(model: Model) -> tuple[Term, ...]:
-    """The terms of a model whose system is a `WithTerms`."""
+    """Return the terms of a model whose system is a `WithTerms`."""
     return model.system.terms  # pyright: ignore
 
 

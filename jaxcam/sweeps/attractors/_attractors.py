@@ -66,7 +66,7 @@ def find_attractors(
 
 
 def _ordered(group, impacts, turns, fingerprint, starts):
-    """Return numbers that do not depend on the order of motions."""
+    """Return numbers and attractors that do not depend on the order of the motions."""
     found = group >= 0
     used = np.unique(group[found])
     # the motion whose initial state is first in lexicographic order represents its

@@ -37,7 +37,7 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
     """
     z = (np.asarray(states) - origin) / scale
     lanes, keep, n = z.shape
-    # a deterministic, quasi-random distribution over a box
+    # wave vectors and phases from a quasi-random sequence, the same in every run
     number = np.arange(1, _WAVES + 1)[:, None]
     steps = np.exp(1 / np.arange(1.0, n + 2))
     spread = np.mod(number * steps, 1.0)
@@ -47,7 +47,7 @@ def fingerprints(states, turns, origin, scale) -> np.ndarray:
         some = turns == length
         orbit = z[some][:, -(length or keep) :]
         waves = np.cos(orbit @ vectors.T + phases)
-        # sorted, so that rounding does not depend on where the orbit starts
+        # add in sorted order, so that rounding does not depend on the starting point
         means = [np.sort(part, axis=1).mean(axis=1) for part in (orbit, waves)]
         made[some] = np.concatenate(means, axis=1)
     return made
@@ -136,6 +136,6 @@ def _components(edges):
 
 
 def _graph(rows, columns, count: int):
-    # repeated edges are merged
+    # with booleans, repeated edges are merged
     joined = np.ones(len(rows), dtype=bool)
     return coo_array((joined, (rows, columns)), shape=(count, count))

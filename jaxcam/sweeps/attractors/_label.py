@@ -65,7 +65,7 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
     for n in range(1, keep // 2 + 1):
         if not len(left):
             break
-        # for most motions, the last points suffice to exclude this period
+        # for most motions, a single pair of points suffices to exclude this period
         last = np.abs(states[left, -1] - states[left, -1 - n]) <= room[left, -1]
         likely = left[np.all(last, axis=1)]
         gone = np.abs(states[likely, n:] - states[likely, :-n])

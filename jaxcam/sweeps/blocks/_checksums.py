@@ -16,15 +16,15 @@ from ._store import FORMAT, SWEEP, VERSION
 
 UNFINISHED = -1
 CHECKSUM = "checksum"
-# attributes with the checksums of the combined results and of the coordinates, because
-# xarray would replace a lost coordinate by 0, 1, 2, ...
+# attributes with the checksums of the combined results and of the coordinates (the loss
+# of a coordinate would go unnoticed, because xarray would replace it by 0, 1, 2, ...)
 TOGETHER, AXES = "together", "axes"
 # exceptions of zarr and its codecs for damaged chunks and metadata
 UNREADABLE = (OSError, ValueError, RuntimeError, TypeError, LookupError, AttributeError)
 
 
 def faults(group: zarr.Group) -> list[str]:
-    """Return the fault of each block; empty if the block is intact."""
+    """Return a phrase on the fault of each block; empty if the block is intact."""
     units, size = int(group.attrs["units"]), int(group.attrs["block"])  # pyright: ignore
     found = []
     for block in range(-(-units // size)):
@@ -61,7 +61,7 @@ def open_store(path: str | Path) -> xarray.Dataset:
     """
     try:
         with warnings.catch_warnings():
-            # a folder without metadata; missing parts are reported when they are needed
+            # ignore warnings of missing metadata: lost parts are reported when needed
             warnings.simplefilter("ignore", zarr.errors.ZarrUserWarning)
             dataset = xarray.open_dataset(
                 path, engine="zarr", consolidated=False, chunks=None, decode_times=False
@@ -111,7 +111,7 @@ def checked(path: str | Path) -> xarray.Dataset:
 
 
 def _check_together(path, dataset: xarray.Dataset) -> None:
-    """Raise `ValueError` if the combined results of all blocks are not intact."""
+    """Raise `ValueError` if the results for all blocks are missing or damaged."""
     about = f"{path}: the blocks are intact; run the sweep again with resume=True"
     wanted = dataset.attrs.get(TOGETHER)
     if wanted is None:
@@ -147,7 +147,7 @@ def stored_identity(path: Path) -> dict | None:
         if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:
             return None
         identity = json.loads(str(attributes[SWEEP]))
-        # the sizes of its blocks, which are needed to read it
+        # the size of the blocks and the names of the arrays, needed to read the sweep
         whole = int(attributes["units"]) > 0 and int(attributes["block"]) > 0  # pyright: ignore
         stored = all(isinstance(name, str) for name in attributes["stored"])  # pyright: ignore
     except (*UNREADABLE, RecursionError):
@@ -156,6 +156,6 @@ def stored_identity(path: Path) -> dict | None:
 
 
 def names_of(blocks: Sequence[int]) -> str:
-    """Return numbers of blocks as text, at most one line."""
+    """Return the numbers of the blocks as text that fits on one line."""
     shown = ", ".join(map(str, blocks[:8]))
     return shown if len(blocks) <= 8 else f"{shown} and {len(blocks) - 8} more"

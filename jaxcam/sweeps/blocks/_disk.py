@@ -31,7 +31,7 @@ from ._store import ordered, plain, StoreLayout, template
 
 
 class OnDisk:
-    """Blocks in a Zarr group; with `resume` those of an earlier run are kept.
+    """A store for blocks in a Zarr group; with `resume`, existing blocks are kept.
 
     Raises:
         ValueError: There is something else at the path.
@@ -79,7 +79,7 @@ class OnDisk:
 
     def _create(self) -> None:
         layout = self.layout
-        # in a temporary folder next to the final one until the group is complete
+        # build the group in a temporary folder next to the final one
         fresh = self.path.with_name(self.path.name + ".new")
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.parent.mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,7 @@ class OnDisk:
         fresh.rename(self.path)
 
     def _meet(self, resume: bool) -> None:
-        """Continue with the data at the path, if it is the same sweep."""
+        """Check that the data at the path are those of this sweep, to be continued."""
         identity = stored_identity(self.path)
         if identity is None:
             raise ValueError(
@@ -136,7 +136,7 @@ class OnDisk:
         self._check_description()
 
     def _check_description(self) -> None:
-        """Raise `ValueError` if blocks do not fit the existing blocks."""
+        """Raise `ValueError` if the existing arrays do not have the expected layout."""
         layout = self.layout
         wanted = {
             name: ((layout.units, *v.tail), np.dtype(v.dtype))

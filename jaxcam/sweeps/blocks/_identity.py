@@ -25,7 +25,7 @@ def about_section(section: AbstractSection) -> dict[str, Any]:
 
 
 def about_system(system) -> Any:
-    """Describe classes and numbers of a system, or of the parameters of a map."""
+    """Describe a system, or the parameters of a map, by its classes and numbers."""
     if isinstance(system, eqx.Module):
         try:
             return system_to_json(system)["system"]  # pyright: ignore
@@ -53,7 +53,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     if callable(value):
-        # without the memory address, which differs between runs
+        # the name alone, because a memory address would differ between runs
         return getattr(value, "__qualname__", type(value).__name__)
     if dataclasses.is_dataclass(value):
         fields = dataclasses.fields(value)

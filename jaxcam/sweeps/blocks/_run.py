@@ -153,7 +153,7 @@ def _take(store: Store, future: Future, block: int, todo) -> None:
 
 
 def _workers_of(pool) -> int:
-    """Return the number of workers of a Dask client, or of cores."""
+    """Return the number of workers of a Dask executor; for others, that of cores."""
     client = getattr(pool, "_client", None)
     if client is not None:
         return max(1, sum(client.nthreads().values()))

@@ -64,7 +64,7 @@ class Store(Protocol):
 
 
 class Memory:
-    """Blocks in memory."""
+    """A store that keeps blocks in memory."""
 
     def __init__(self, layout: StoreLayout):
         self.layout = layout
@@ -104,7 +104,7 @@ def ordered(layout: StoreLayout, arrays) -> dict[str, np.ndarray]:
 
 
 def template(layout: StoreLayout, arrays: Mapping[str, np.ndarray]) -> xarray.Dataset:
-    """Return coordinates, attributes and existing arrays."""
+    """Return a dataset with the coordinates and attributes of a layout, and arrays."""
     data = {}
     for name, array in arrays.items():
         variable = layout.variables[name]

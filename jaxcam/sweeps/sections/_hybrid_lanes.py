@@ -30,13 +30,13 @@ from ._samples import BEHIND
 
 
 _WIDTHS = ((32, 16), (512, 48), (sys.maxsize, 1 << 16))
-"""Pairs of an upper limit of the total number of motions, and the number of motions
-that then advance together.
+"""Pairs of a total number of motions, and the number of motions that advance together
+up to this total.
 """
 
 
 class Rows(NamedTuple):
-    """The rows of the logs that a section stores: see `Table`."""
+    """The rows that a section stores from the log of each motion; see `Table`."""
 
     row: Callable
     places: int
@@ -49,7 +49,7 @@ def chunk_rows(width: int) -> int:
 
     Frequent checks take time; rare ones leave finished motions in the batch.
     """
-    # a small batch gains from fewer checks
+    # in a small batch, checks take a larger share of the time
     return 1024 if width < 16 else 64
 
 
@@ -58,7 +58,7 @@ def smallest_gaps(
 ):
     """Return the smallest gap of each state at `t0`, shape `(motions,)`.
 
-    To each gap, `room` times the resolution of the gap is added.
+    Each gap is increased by `room` times its resolution.
     """
     batched, shared = split_lanes(as_arrays(system), where, values)
     parts = jnp.asarray(t0, float), _rows(states), jnp.asarray(room, float)
@@ -139,7 +139,7 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
         run: `run(states, values, width)` returns arrays with one row for each
             motion, the last of them the code.
         lanes: Maximum number of motions that advance together.
-        tails: Shapes of a row of the arrays.
+        tails: Shape of one row of each array.
 
     Returns:
         The same arrays for all motions; rows of motions that failed, or whose initial
@@ -157,7 +157,7 @@ def run_lanes(run, system, t0, states, where, values, lanes: int, tails):
     code = np.full(count, BEHIND)
     if not np.any(ready):
         return (*(np.full((count, *tail), np.nan) for tail in tails), code)
-    # inadmissible lanes, and lanes missing in a block, repeat an admissible lane
+    # motions that cannot start, and unused positions, repeat a motion that can start
     one = int(np.argmax(ready))
     index = np.full(max(count, width), one)
     index[:count] = np.where(ready, np.arange(count), one)
@@ -184,7 +184,7 @@ def run_tables(section, rows: "Rows", states, turns, where, values, watched=None
         The table, `(motions, places, columns)`; impacts and codes of the motions.
     """
     rows.settings.check()
-    # raises an error if there is no period
+    # this raises an error if there is no period
     section.turn(where, values)
     _check_first(section, rows.settings, states, where, values)
     system, chosen = (section.system, where) if watched is None else watched
@@ -257,7 +257,7 @@ def _lifted(batched, shared, t0, states):
         def worst(x):
             return jnp.min(gaps(system, t0, x))
 
-        # the gap is nearly linear over such distances: Newton steps along its gradient
+        # Newton steps along the gradient of the gap, which is nearly linear so close by
         for _ in range(6):
             gap, slope = jax.value_and_grad(worst)(state)
             state = state + jnp.maximum(-gap, 0.0) * slope / jnp.sum(slope * slope)

@@ -63,8 +63,8 @@ class PoincareSection(AbstractSystemSection):
         whole = with_section(self.system, self.function, self.direction, n)
         inner = None if where is None else lambda s: where(s.system)
         settings = Settings() if self.settings is None else self.settings
-        # one point more than requested: the events before each point are counted from
-        # the previous point
+        # store one point more than requested, because the events before each point are
+        # counted from the previous point
         rows = Rows(_Row(keep + 1), keep + 2, 4 + n, settings)
         parts = states, turns, where, values
         numbers, _, code = run_tables(self, rows, *parts, watched=(whole, inner))

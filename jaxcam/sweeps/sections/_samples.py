@@ -46,7 +46,7 @@ def with_lanes(old: Samples, which, new: Samples) -> Samples:
 
 
 def filled(samples: Samples, keep: int) -> Samples:
-    """Return the samples padded to the same number for each motion."""
+    """Return the samples of each motion, padded at the end to `keep` samples."""
     missing = keep - samples.states.shape[1]
     if missing == 0:
         return samples

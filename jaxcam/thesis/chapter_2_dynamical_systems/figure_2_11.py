@@ -20,7 +20,7 @@ MAPS = {
     "piecewise-linear, discontinuous": SkewMap(*_numbers(0.5, 0.4, 0.3, -1.0)),
     "square root": SquareRootMap(*_numbers(0.5, 0.1)),
 }
-"""The three maps of Figure 2.11; the parameter values are ours."""
+"""The three maps of Figure 2.11; the parameter values are not from the thesis."""
 
 
 def compute(system: CamFollower) -> Rows:

@@ -1,7 +1,7 @@
 """Figure 2.13 and eq. (2.43) of the thesis: the bouncing ball, simulated with event
 detection and by time-stepping.
 
-The thesis gives the formula; the parameters of the ball are ours.
+The thesis gives the formula, but not the parameters of the ball used here.
 """
 
 from functools import cache
@@ -22,18 +22,20 @@ from ..target import Rows, Target
 
 _BALL = BouncingBall(jnp.asarray(9.81), jnp.asarray(0.7))
 _LAUNCH = 1.0
-# numbers of steps over which an error is averaged, relative to the nominal number
+# numbers of steps for which errors are averaged, relative to the nominal number
 _NEIGHBOURS = (0.92, 0.96, 1.0, 1.04, 1.08)
 
 
 class Zeno(NamedTuple):
-    """The bouncing ball up to contact, with event detection and five step lengths."""
+    """The bouncing ball until it comes to rest, simulated with event detection and with
+    five step lengths.
+    """
 
     exact: float
     """Accumulation time (thesis, eq. (2.43))."""
     run: Trajectory
     steps: SteppedMotion
-    """Run with the fewest steps."""
+    """Time-stepping run with the fewest steps."""
     counts: tuple[int, ...]
     rests: np.ndarray
     """Accumulation time for each number of steps (s)."""
@@ -56,8 +58,8 @@ def zeno() -> Zeno:
 def errors() -> tuple[np.ndarray, np.ndarray]:
     """Return step lengths (s) and averaged errors of the accumulation time (s).
 
-    The error is a sawtooth function of where the impacts fall within their steps, so it
-    is averaged over neighbouring numbers of steps.
+    The error is a sawtooth function of the positions of the impacts within their steps,
+    so it is averaged over neighbouring numbers of steps.
     """
     found = zeno()
     start, end = np.array([0.0, _LAUNCH]), 1.2 * found.exact

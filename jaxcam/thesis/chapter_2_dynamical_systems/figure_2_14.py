@@ -1,7 +1,7 @@
 """Figure 2.14 (d): a branch of orbits as a function of the belt speed, with its sliding
 bifurcations.
 
-The figure is a sketch; the parameters of the oscillator are ours.
+The printed figure is a sketch, so the parameters of the oscillator were chosen freely.
 """
 
 from functools import cache
@@ -44,7 +44,7 @@ class Belted(NamedTuple):
 
 
 def belted(belt: float, state=(0.0, 0.0), turns: int = _SETTLE) -> Belted:
-    """Return the motion after some periods of the forcing."""
+    """Return the motion over one forcing period, after `turns` periods of settling."""
     system = eqx.tree_at(lambda s: s.belt, BELT, jnp.asarray(float(belt)))
     period = float(system.period)
     settled = simulate(system, state, 0.0, turns * period).final
@@ -137,7 +137,7 @@ def _rate_beyond(belt: float, name: str) -> float:
     if side is None or not np.isfinite(belt):
         return np.nan
     switches = _switches(belted(belt, turns=2 * _SETTLE).run)
-    # the orbit arrives at the surface from this side
+    # find the switch at which the orbit arrives at the surface from the side required
     arrives = np.asarray(switches.kind) != SwitchKind.LEAVES
     from_side = np.asarray(switches.direction) == -side
     k = int(np.flatnonzero(arrives & from_side)[0])

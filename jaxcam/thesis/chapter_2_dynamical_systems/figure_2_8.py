@@ -1,7 +1,7 @@
 """Figure 2.8: a saddle, in closed form and numerically, with its multipliers.
 
-The printed figure is a sketch of a flow; the figure drawn here is that of an impact
-oscillator.
+The printed figure is a sketch of a flow; the figure drawn here shows the stroboscopic
+map of an impact oscillator instead.
 """
 
 from functools import cache
@@ -23,8 +23,9 @@ from ..target import Rows, Target
 
 
 _OMEGA, _RESTITUTION = 2.8, 0.8
-"""Forcing and restitution of the oscillator of Figure 2.8; with its wall position, a
-pair of orbits with one impact per period exists.
+"""Forcing frequency and coefficient of restitution of the oscillator of Figure 2.8. The
+position of its wall is chosen such that a pair of orbits with one impact per period
+exists.
 """
 _LENGTH = 0.6
 

@@ -1,4 +1,4 @@
-"""Figure 3.8: fold and flip of the branch, and its multipliers in between."""
+"""Figure 3.8: fold and flip of the P(1,1) branch, and its multipliers in between."""
 
 from typing import NamedTuple
 
@@ -43,11 +43,11 @@ class SmoothBranch(NamedTuple):
     """The P(1,1) branch of a rig, including the saddles beyond its fold."""
 
     speed: np.ndarray
-    """(k,) rpm."""
+    """Speeds (rpm), shape `(k,)`."""
     angle: np.ndarray
-    """(k,) angle of the follower at its impact (rad)."""
+    """Angles of the follower at its impact (rad), shape `(k,)`."""
     multipliers: np.ndarray
-    """(k, 2)."""
+    """The two multipliers of each orbit, shape `(k, 2)`."""
     fold: float
     flip: float
 
@@ -61,7 +61,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
         lost = np.full(points, np.nan)
         return SmoothBranch(speeds, lost, np.full((points, 2), np.nan), np.nan, np.nan)
     angles, values = np.zeros(points), np.zeros((points, 2), dtype=complex)
-    # in both directions from the known orbit, each orbit from its neighbour
+    # follow the branch in both directions from the known orbit
     middle = int(np.argmin(np.abs(speeds - SEARCH)))
     orbit = start
     for walk in (range(middle, points), range(middle - 1, -1, -1)):
@@ -83,7 +83,7 @@ def smooth_branch(system: CamFollower, points: int = 16) -> SmoothBranch:
 
 
 def _around_the_fold(system: CamFollower, orbit, rpm: float):
-    """Return speed (rpm), angle and multipliers of orbits from `rpm` through the fold.
+    """Yield speed (rpm), angle and multipliers of orbits from `rpm` around the fold.
 
     Around the fold the sum of the multipliers is monotonic, whereas the speed is not.
     """

@@ -9,7 +9,7 @@ from ..remember import remembered
 
 
 DWELL = 60.0, 10.0
-"""Waiting and recording time at each speed (s) (section 4.7)."""
+"""Waiting time and recording time at each speed (s), from section 4.7."""
 UP, DOWN = (120.0, 200.0), (200.0, 150.0)
 """First and last speed (rpm) of the upward and the downward sweep."""
 _STEP = {"default": 0.5, "full": 0.1}

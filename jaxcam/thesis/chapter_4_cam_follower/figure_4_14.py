@@ -13,7 +13,7 @@ from ..target import Rows, Target
 
 
 CONTACT_SPEED, DETACHMENT = 110.0, 125.0
-"""Speed of the figure, and speed of detachment (section 5.2)."""
+"""Speed of the figure, and speed of detachment in section 5.2 (rpm)."""
 
 
 def constrained_run(system: CamFollower, rpm: float = CONTACT_SPEED) -> Trajectory:

@@ -1,6 +1,7 @@
 """Figure 4.16, simulated part: the impacts of one turn at four speeds.
 
-Heights are angles above the cam; their ratio shows the loss at an impact.
+The height of a flight is its largest angle above the cam; the ratio of two successive
+heights shows the loss at an impact.
 """
 
 import matplotlib.pyplot as plt

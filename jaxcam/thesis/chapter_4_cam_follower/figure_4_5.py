@@ -22,7 +22,7 @@ PROGRAM = (
     ("simple harmonic", 270, 330, 60, -1.0),
     ("dwell", 330, 360, 30, 0.0),
 )
-"""Figure 4.5 (a): function, and start, end and delta angle (degrees)."""
+"""Segments of Figure 4.5 (a): function; start, end and delta angle (degrees); rise."""
 
 
 def _program() -> MotionProgram:

@@ -34,11 +34,12 @@ class Picture(NamedTuple):
     """Printed labels of its attractors; chaos is "aperiodic"."""
     points: dict[str, tuple[float, float]]
     low: tuple[float, float] = _BOX[0]
-    """Corners of the state grid."""
+    """Lower corner of the state grid."""
     high: tuple[float, float] = _BOX[1]
+    """Upper corner of the state grid."""
     reruns: int = _RERUNS
-    """Number of times that a non-periodic motion is extended, doubling its length each
-    time.
+    """Number of times that a non-periodic motion is extended; each time, its length is
+    doubled.
     """
 
 

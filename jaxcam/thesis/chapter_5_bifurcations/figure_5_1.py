@@ -13,10 +13,11 @@ from ..target import Rows, Target
 
 
 TURNS, KEEP = 300, 100
-"""Cycles at each speed, and how many are kept, as given in section 5.2."""
+"""Cycles simulated and cycles kept at each speed, as given in section 5.2."""
 _STEP = {"default": 0.25, "full": 0.1}
-"""Speed step and end points (rpm) of Figure 5.1."""
+"""Speed step of Figure 5.1 (rpm)."""
 _ENDS = 120.0, 170.0
+"""Lowest and highest speed of Figure 5.1 (rpm)."""
 _SAID = {
     (1, "contact", "to"): 125.0,
     (1, "P(inf,1)", "to"): 152.67,
@@ -24,7 +25,7 @@ _SAID = {
     (-1, "P(1,1)", "to"): 152.0,
     (-1, "P(4,4)", "from"): 157.5,
 }
-"""Values from the text of sections 5.2.1 and 5.2.2."""
+"""Speeds (rpm) given in the text of sections 5.2.1 and 5.2.2."""
 
 
 @remembered

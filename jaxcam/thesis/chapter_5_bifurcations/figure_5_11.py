@@ -15,8 +15,9 @@ from .figure_5_1 import KEEP, TURNS
 
 
 _ZOOM = 152.6, 153.2
-"""Speed range (rpm) of Figure 5.11, and number of speeds."""
+"""Speed range of Figure 5.11 (rpm)."""
 _ZOOMED = {"default": 401, "full": 2001}
+"""Number of speeds in this range."""
 
 
 @remembered
@@ -40,7 +41,7 @@ def compute(system: CamFollower, size: str) -> Rows:
     made = onset(system, size)
     speeds = np.asarray(rad_s_to_rpm(made.values))
     labels = made.labels[:, 0]
-    # a failed run gives no information about its speed
+    # a failed run gives no information about the motion at its speed
     known = labels != "failed"
     other = known & (labels != "P(inf,1)")
     first = speeds[other].min() if np.any(other) else np.nan

@@ -1,4 +1,4 @@
-"""Figure 5.12: orbits reached from random initial states, and their speeds."""
+"""Figure 5.12: the orbits reached from random initial states, against speed."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,11 +13,11 @@ from ..target import Rows, Target
 
 
 _MONTE_CARLO = 152.0, 160.0
-"""Settings of Figure 5.12: speed range (rpm), initial states per speed, cycles, cycles
-kept, and number of speeds.
-"""
+"""Speed range of Figure 5.12 (rpm)."""
 _STARTS, _MC_TURNS, _MC_KEEP = 20, 100, 50
+"""Initial states per speed, cycles simulated, and cycles kept."""
 _DRAWN = {"default": 161, "full": 801}
+"""Number of speeds."""
 BOX = (0.34, -3.0), (0.55, 3.0)
 """Box from which the initial states are drawn."""
 

@@ -1,4 +1,4 @@
-"""Figure 5.15: motions from A and B."""
+"""Figure 5.15: motions that start at the points A and B of Figure 5.14."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Figure 5.17: motions from C and D."""
+"""Figure 5.17: motions that start at the points C and D of Figure 5.16."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Figure 5.19: motions from E and F."""
+"""Figure 5.19: motions that start at the points E and F of Figure 5.18."""
 
 from ..motions import motion_target, ShownMotion
 from .figure_5_18 import E, F1

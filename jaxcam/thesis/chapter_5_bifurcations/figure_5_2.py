@@ -1,4 +1,4 @@
-"""Figure 5.2: motions along the diagram."""
+"""Figure 5.2: motions at six speeds of the bifurcation diagram."""
 
 import numpy as np
 

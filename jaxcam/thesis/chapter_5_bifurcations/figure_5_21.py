@@ -1,4 +1,4 @@
-"""Figure 5.21: motions from G and H."""
+"""Figure 5.21: motions that start at the points G and H of Figure 5.20."""
 
 from ..motions import motion_target, ShownMotion
 from .figure_5_20 import G1, H1

@@ -36,8 +36,8 @@ def _sticking(system, speeds):
 
 @remembered
 def sticking_times(system: CamFollower) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return speeds (rpm) up to the interruption, sticking times (s) and the
-    interruption.
+    """Return speeds (rpm) up to the interruption, the sticking times (s) at these
+    speeds, and the speed of the interruption (rpm).
 
     Sticking times are exact, however short they are; the distances of the speeds from
     the interruption are spaced logarithmically.

@@ -21,7 +21,7 @@ class LobeEvents(NamedTuple):
 
     fold: float
     border: float
-    """Disappearance of the fixed point of the inner lobe at the common corner."""
+    """Shift at which the fixed point of the inner lobe ends at the common corner."""
     flip: float
 
 
@@ -95,7 +95,7 @@ def draw(system: CamFollower) -> Figure:
     x_0, x_inf = float(fitted.x_0), float(fitted.x_inf)
     for ax, (name, shift) in zip(axes.flat, shifts, strict=True):
         _map_with_identity(ax, fitted, shift, x_inf - 0.3 * (x_0 - x_inf), x_0)
-        # points at which the map intersects the identity
+        # mark the points at which the map intersects the identity
         y = x_0 - (x_0 - x_inf) * np.linspace(1e-7, 1 - 1e-7, 40001) ** 2
         apart = y - np.asarray(fitted(jnp.asarray(y))) - shift
         near = np.flatnonzero(apart[1:] * apart[:-1] <= 0)

@@ -31,7 +31,7 @@ _SHIFTS = 600
 
 
 class Iterated(NamedTuple):
-    """Figure 5.28: the fitted map and the motion, both from the sticking state."""
+    """The data of Figure 5.28: angles relative to the sticking state."""
 
     speeds: np.ndarray
     """Speeds (rpm) at which the map is iterated, shape `(k,)`."""

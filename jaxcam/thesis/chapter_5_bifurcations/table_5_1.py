@@ -1,6 +1,7 @@
 """Table 5.1, simulated column: speeds of the main events.
 
-The printed rows for the route to chaos and for chaos are not distinguished here.
+Here, the route to chaos and chaos itself, which have separate rows in the printed
+table, are treated as one range.
 """
 
 import numpy as np
@@ -22,9 +23,11 @@ WORDS = Events(
     "P(2,2), from",
     "P(2,2) and its doublings, to",
 )
-"""The events, and their printed speeds (rpm) for the rig and for the simulation."""
+"""Names of the events."""
 RIG = Events(125, 125, 155, 155, 170, 150, 188, 188, 200)
+"""Speeds (rpm) printed for the rig."""
 MODEL = Events(125, 125, 152, 152.6, 154.5, 135, 151, 152, 170)
+"""Speeds (rpm) printed for the simulation."""
 
 
 def compute(system: CamFollower, size: str) -> Rows:

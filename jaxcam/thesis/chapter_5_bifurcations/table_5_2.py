@@ -51,8 +51,8 @@ NEAR_FOLD = SPEEDS < 140.0
 """Rows close to the fold, where the multipliers depend strongly on the speed."""
 
 
-# Section 5.2.1: fold of P(1,1), and its flip, which the text gives as "close to" this
-# speed
+# Speeds (rpm) of the fold and the flip of P(1,1) in section 5.2.1; according to the
+# text, the flip is "close to" this speed
 FOLD_SPEED = 135.946
 FLIP_SPEED = 152.0
 

@@ -19,8 +19,9 @@ from ..target import Rows, Target
 
 
 _MAP_SPEED = 152.6
-"""Speed (rpm) at which Figure 5.25 is drawn, and its range of perturbations."""
+"""Speed at which Figure 5.25 is drawn (rpm)."""
 _PERCENT = 1.0
+"""Range of the perturbations of the angle in Figure 5.25 (%)."""
 _DOUBLED = 4
 """Number of times that the range may be doubled for a rig with different lobes."""
 Q, M, DELTA_PI, DELTA_X = -0.62, -0.535, 2.243e-4, 1.022e-3

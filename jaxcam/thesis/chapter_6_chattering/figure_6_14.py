@@ -1,4 +1,4 @@
-"""Figure 6.14: prediction and simulation after a shift of D*."""
+"""Figure 6.14: predicted and simulated state at the section after a change of D*."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -1,4 +1,4 @@
-"""Figure 6.15: prediction and simulation after a change of speed.
+"""Figure 6.15: predicted and simulated state at the section after a change of speed.
 
 Below the interruption the motion depends on the speed only through the release; the
 slopes are those of Table 6.3, here computed from simulations.

@@ -17,7 +17,7 @@ from .rebuilt import composed_at, draw_rebuilt, lobe_rows, Rebuilt
 @remembered
 def rebuilt_turn(system: CamFollower) -> Rebuilt:
     """Compute the data of Figure 6.16: the state at the section one turn after a
-    deviation along the vector B, which is given by its angle (rad).
+    deviation along the vector B; the deviation is given by its angle component (rad).
     """
     rig, composed = composed_at(system, late=True)
     change = np.linspace(-2e-5, 1e-4, 400)

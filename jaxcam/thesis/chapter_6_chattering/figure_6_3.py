@@ -29,7 +29,7 @@ error; the impact speed grows with the square root of the reduction.
 
 
 class Series(NamedTuple):
-    """A motion of Figure 6.3, from an impact in the plane of Figure 6.2."""
+    """A motion of Figure 6.3; it starts with an impact in the plane of Figure 6.2."""
 
     name: str
     time: float
@@ -41,8 +41,8 @@ class Series(NamedTuple):
 
 @remembered
 def series(system: CamFollower) -> list[Series]:
-    """Compute motions from S^1 and on both sides of it, from S^2, from C and from
-    inside D.
+    """Compute motions that start on the curve S^1, on both sides of it, on S^2, on C,
+    and inside the region D.
     """
     found = manifold_of(system, BRANCHES)
     rig, before, region = found.system, found.manifold.before, found.region

@@ -8,7 +8,7 @@ from .manifold import draw_manifold, manifold_of, manifold_rows
 
 
 BRANCHES = 5
-"""Number of impacts S^k and W^k shown."""
+"""Number of curves S^k, and of curves W^k, that are shown."""
 
 
 def compute(system: CamFollower) -> Rows:

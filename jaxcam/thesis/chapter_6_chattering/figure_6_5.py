@@ -47,7 +47,7 @@ def compute(system: CamFollower) -> Rows:
 
 
 def _largest(r) -> float:
-    """Return the value above which the lambda-map is NaN."""
+    """Return the largest lambda for which the lambda-map is finite."""
     low, high = 0.34, 0.5
     for _ in range(60):
         middle = (low + high) / 2

@@ -1,4 +1,4 @@
-"""Figure 6.6: ratio of successive impact times tau, from h(lambda) and exact."""
+"""Figure 6.6: ratio of successive impact times tau, by h(lambda) and simulated."""
 
 import jax.numpy as jnp
 import matplotlib.pyplot as plt

@@ -56,8 +56,8 @@ def _onwards(system, time, speed):
 
 
 def manifold_rows(system: CamFollower, branches: int) -> Rows:
-    """Return rows that check S^1 (its next impact has zero speed) and C (lambda-bar at
-    release).
+    """Return rows that check two curves: S^1, whose next impact has zero speed, and C,
+    on which lambda is lambda-bar at the release.
     """
     found = manifold_of(system, branches)
     before = found.manifold.before

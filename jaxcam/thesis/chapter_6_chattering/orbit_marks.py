@@ -19,7 +19,7 @@ from .table_6_1 import ACCUMULATION, RELEASE, SECTION_RELATIVE
 
 
 _MARKS = (("^", "accumulation"), ("D", "release"), ("s", "section"))
-"""Triangle, diamond and square markers of Figures 6.7 to 6.10."""
+"""Markers of Figures 6.7 to 6.10 (triangle, diamond, square), and their meanings."""
 
 
 def compute_marks(system: CamFollower) -> Rows:
@@ -51,7 +51,7 @@ def _marked(system: CamFollower):
     drawn = trajectory_curve(run, None, 8000)
     cam = states[:, 1] - _cam_velocity(run, times)
     gaps = np.asarray(run.gap(times)).ravel()
-    # gap and its rate along the curve, without the jumps
+    # rate of the gap along the curve: velocity of the follower minus that of the cam
     rate = drawn.state[:, 1] - _cam_velocity(run, drawn.time)
     return drawn, drawn.gap[:, 0], rate, times, gaps, cam, period
 

@@ -20,7 +20,7 @@ from .table_6_3 import D_STAR, nearest_impact
 
 
 _RANK = 37
-"""The late impact at which the composed map starts (docs/chatter.md)."""
+"""Index of the late impact at which the composed map starts (docs/chatter.md)."""
 
 
 class Rebuilt(NamedTuple):
@@ -33,7 +33,9 @@ class Rebuilt(NamedTuple):
 
 
 def composed_at(system: CamFollower, late: bool) -> tuple[CamFollower, ComposedMap]:
-    """Return the rig at its interruption, and the map from D* or from a late impact."""
+    """Return the rig at its interruption, and the composed map, which starts at D* or,
+    if `late` is true, at a late impact.
+    """
     rig = interruption(system)
     if late:
         return rig, composed_map(rig, speed_of, _RANK)
@@ -43,14 +45,16 @@ def composed_at(system: CamFollower, late: bool) -> tuple[CamFollower, ComposedM
 
 
 def error_of(found: Rebuilt) -> float:
-    """Return the median error of the predicted velocity over the simulated range."""
+    """Return the median error of the predicted velocity, relative to the range of the
+    simulated velocity.
+    """
     velocity = found.simulated[:, 1]
     range_ = float(np.ptp(velocity))
     return float(np.median(np.abs(found.predicted[:, 1] - velocity))) / range_
 
 
 def lobe_rows(found: Rebuilt) -> Rows:
-    """Return the error of a prediction of the lobes, and the heights of the lobes."""
+    """Return rows with the error of the prediction and the heights of the lobes."""
     return [
         ("median error over the range of the velocity", np.nan, error_of(found), ""),
         (

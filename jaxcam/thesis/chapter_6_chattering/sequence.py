@@ -15,7 +15,7 @@ from ..remember import remembered
 
 
 class ChatterSequence(NamedTuple):
-    """The impacts of the sticking orbit below its interruption."""
+    """The impacts of the sticking orbit at a speed below the interruption."""
 
     system: CamFollower
     frame: ChatterFrame

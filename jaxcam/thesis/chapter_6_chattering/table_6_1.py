@@ -14,14 +14,17 @@ from ..target import Rows, Target
 CHATTER_SPEED = 152.67
 """Speed of the table (rpm)."""
 ACCUMULATION = (0.33474, 0.30531, 0.86956)
-"""Time in the period (s), angle (rad) and velocity (rad/s) of the follower."""
+"""Time in the period (s), angle (rad) and velocity (rad/s) at the accumulation."""
 RELEASE = (0.33668, 0.30698, 0.84854)
+"""The same quantities at the release."""
 SECTION_STATE = (0.33717, 0.22313)
-"""At the end of the period: the follower, and the follower relative to the cam."""
+"""Angle (rad) and velocity (rad/s) of the follower at the end of the period."""
 SECTION_RELATIVE = (0.00494, 0.22315)
+"""The same quantities relative to the cam."""
 DECIMALS = 5
 """Decimal places in the table."""
 PERIOD, STICKING = 0.39300, 0.00194
+"""Period and sticking time (s)."""
 
 
 def compute(system: CamFollower) -> Rows:

@@ -20,8 +20,8 @@ D_STAR = -0.00194
 
 
 def nearest_impact(rig: CamFollower, release: float, tau: float) -> int:
-    """Return the index of the impact whose time relative to the next release has the
-    ratio to `tau` that is closest to one.
+    """Return the index of the impact whose time relative to the next release is closest
+    to `tau` on a logarithmic scale.
     """
     impacts = impacts_from_release(rig, 40)
     found = np.asarray(impacts.time) - release - float(rig.period)

@@ -1,4 +1,4 @@
-"""Table 6.4: closing the loop at the interruption.
+"""Table 6.4: the map of a complete cycle at the interruption.
 
 The compensation 1/K_beta is compared with tau*^2, the factor missing in eq. (6.104) of
 the thesis; D* is the impact with the best agreement. The printed matrix A starts at D*
@@ -32,7 +32,7 @@ def compute(system: CamFollower) -> Rows:
     rank = nearest_impact(rig, release, -np.sqrt(INVERSE_SCALE))
     local = composed_map(rig, speed_of, rank)
     state = contact_at(rig.prepared(), local.time, local.speed)
-    # by definition of the interruption, the accumulation is at release
+    # at the interruption, accumulation and release coincide by definition
     matrix = np.asarray(local.matrix)
     rows = [
         ("speed", INTERRUPTION, rad_s_to_rpm(rig.speed), "rpm"),
