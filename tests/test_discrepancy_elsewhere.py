@@ -184,7 +184,7 @@ def test_the_location_that_explains_clearly_more_is_chosen(
     found = sought_elsewhere(_Found(5000.0), ask)  # pyright: ignore
     assert found.location == chosen
     assert len(tried) == asked
-    assert ("This was sought at" in found.summary) == (chosen is not None)
+    assert ("This effect acts at" in found.summary) == (chosen is not None)
 
 
 def test_terms_of_ones_own_are_not_moved_to_other_gaps(unchecked_types):

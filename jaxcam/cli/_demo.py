@@ -49,11 +49,11 @@ def demo(
     ] = True,
 ) -> None:
     """
-    Compare recordings with a model, diagnose it and follow branches of periodic orbits.
+    Compare recordings with a model, diagnose the model and follow periodic orbits.
 
     By default, the simulated recordings shipped with the package are used. The report
-    with its figures is DIR/index.html, the data are in DIR/result.json, and the
-    diagnosis is in DIR/diagnosis.
+    is written to DIR/index.html, the data to DIR/result.json, and the diagnosis to
+    DIR/diagnosis.
 
     \b
     Examples:

@@ -25,7 +25,7 @@ def new_rig(
     ],
 ) -> None:
     """
-    Write an example to edit: a system in Python and its rig file.
+    Write the two files of a new rig, a system in Python and a rig file, as an example.
 
     \b
     Examples:

@@ -107,7 +107,7 @@ def diagnose(
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
-        report(f"seeking at the {kind} number {location[k] + 1}", None)
+        report(f"searching at {kind} {location[k] + 1}", None)
         name = "at_{}_{}".format(*location)
         return asked(recordings, None if keep is None else keep / name, location)
 
@@ -169,7 +169,7 @@ def _answered(
     """Search for terms, test the result, and return the diagnosis."""
     ripple = None
     if question.drives:
-        report("reading the drive", None)
+        report("examining the speed of the drive", None)
         ripple = ripple_of(
             question.drives, question.drive_noise, question.drive_channel, policy
         )

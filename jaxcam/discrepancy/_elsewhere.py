@@ -47,8 +47,8 @@ def sought_elsewhere(
     first, then = (one.said(system, system.coordinates) for one in (Location(), where))
     kind, k = ("coordinate", 0) if where.coordinate else ("gap", 1)
     sentence = (
-        f"This was sought at the {kind} {then[k]}, because nothing at {first[k]} "
-        "explains the recordings as well."
+        f"This effect acts at the {kind} {then[k]}: no effect at {first[k]} explains "
+        "the recordings as well."
     )
     return dataclasses.replace(
         best, summary=f"{best.summary} {sentence}", location=then
