@@ -85,6 +85,14 @@ def test_one_recording_does_not_differ():
     assert differing(_fitted([motion]), Policy()) is None
 
 
+def test_a_model_without_parameters_has_none_that_differs():
+    """The nominal stiffness is wrong, and nothing is free."""
+    problem = _fitted([_free(x, DAMPING) for x in (0.1, 0.2)]).problem
+    fixed = fit(problem, free=())
+    assert fixed.cost > 2 * problem.samples
+    assert differing(fixed, Policy()) is None
+
+
 def test_a_force_common_to_the_recordings_is_no_difference():
     """A force that acts from one second on in every recording."""
     settled = 0.002 * (1 - np.cos(np.sqrt(STIFFNESS) * (TIME - 1))) * (TIME > 1)

@@ -9,7 +9,8 @@ import pytest
 
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.report._missing import _errors, _graded, _level, _words
+from jaxcam.discrepancy.report._curves import errors_of, graded, level_of
+from jaxcam.discrepancy.report._missing import _words
 from jaxcam.discrepancy.search import occam, roughness
 from jaxcam.discrepancy.terms import (
     Factor,
@@ -222,11 +223,11 @@ def test_only_forces_are_averaged_over_an_integration_step():
 def test_a_table_has_several_points_in_a_jump():
     """Its ends stay; a function that is not finite has equidistant points."""
     even = np.linspace(0.0, 1.0, 48)
-    graded = _graded(even, lambda x: np.tanh((x - 0.4) / 0.01))
-    assert graded[0] == 0.0 and graded[-1] == pytest.approx(1.0)
-    assert np.all(np.diff(graded) > 0)
-    assert np.sum(np.abs(graded - 0.4) < 0.02) > 8 > np.sum(np.abs(even - 0.4) < 0.02)
-    assert _graded(even, lambda x: np.where(x > 0.5, np.nan, x)) is even
+    found = graded(even, lambda x: np.tanh((x - 0.4) / 0.01))
+    assert found[0] == 0.0 and found[-1] == pytest.approx(1.0)
+    assert np.all(np.diff(found) > 0)
+    assert np.sum(np.abs(found - 0.4) < 0.02) > 8 > np.sum(np.abs(even - 0.4) < 0.02)
+    assert graded(even, lambda x: np.where(x > 0.5, np.nan, x)) is even
 
 
 def test_families_have_one_place_each_and_different_names():
@@ -261,12 +262,12 @@ def test_an_undetermined_straight_line_has_no_part_in_the_error():
     basis = np.stack([np.ones_like(along), along, np.cos(np.pi * along)], axis=1)
     covariance = np.diag([1.0, 1.0, 1e-4])
     value = basis @ np.array([3.0, -2.0, 0.5])
-    level = _errors(_level(family, along, basis), covariance)
-    assert np.max(_errors(basis, covariance)) > 1.0
+    level = errors_of(level_of(family, along, basis), covariance)
+    assert np.max(errors_of(basis, covariance)) > 1.0
     assert np.max(level) == pytest.approx(0.01, rel=0.02)
     words = _words(family, "force", along, value, level)
     assert "differs most from a straight line at velocity" in words
     # a function of time or phase may contain a slope
     timed = dataclasses.replace(family, argument=Variable.TIME)
-    slope = _level(timed, along, basis)[:, 1]
+    slope = level_of(timed, along, basis)[:, 1]
     np.testing.assert_allclose(slope, along, atol=1e-12)

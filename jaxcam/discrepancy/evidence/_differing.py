@@ -73,7 +73,8 @@ def differing(found: Fit, policy: Policy, terms: int = 0) -> Differing | None:
     """
     problem, samples = found.problem, found.problem.samples
     shared = [n for n in found.free if not problem.parameter(n).per_record]
-    if len(problem.records) < 2 or not above_noise(found.cost, samples, policy):
+    alone = len(problem.records) < 2 or not shared
+    if alone or not above_noise(found.cost, samples, policy):
         return None
     number, heat = len(problem.records) - 1, found.cost / samples
     chance = policy.false_alarms / len(shared)

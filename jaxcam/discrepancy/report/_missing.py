@@ -4,15 +4,13 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ...fitting import Fit
-from ...hybrid.programs import program
-from ..search import Free, free_term, Hidden, Missing
+from ..policy import Policy
+from ..search import Free, Hidden, Missing
 from ..terms import (
     Factor,
     Family,
@@ -25,6 +23,15 @@ from ..terms import (
     Where,
 )
 from ._close_forms import CloseForm
+from ._curves import (
+    covariance_of,
+    curve,
+    degree_of,
+    errors_of,
+    graded,
+    level_of,
+    with_slopes,
+)
 from ._formula import formula_of
 from ._hidden import hidden_formula, hidden_table, hidden_unit, hidden_words
 
@@ -38,8 +45,6 @@ _KINDS = {
 # Ratio of the errors with and without a straight line above which the line is not
 # determined
 _UNDETERMINED = 3.0
-# Points at which a function is evaluated, for each point of its table
-_FINER = 20
 _VERBS = {
     "force": "a force",
     "restitution": "a coefficient of restitution",
@@ -114,19 +119,19 @@ def missing_functions(
     missing: Missing,
     velocities: tuple[float, float],
     positions: tuple[float, float],
-    points: int,
     close: Mapping[str, CloseForm],
+    policy: Policy,
 ) -> tuple[MissingFunction, ...]:
     """Return the functions found, each with its errors.
 
     **Arguments:** the functions found, the ranges of the motion (for the tables of
-    functions of two arguments), the number of points of each grid, and the closest
-    parametric forms, by the slots of the functions.
+    functions of two arguments), the closest parametric forms, by the slots of the
+    functions, and the policy.
     """
     return tuple(
-        _hidden(missing.fit, one, points)
+        _hidden(missing.fit, one, policy.shape_points)
         if isinstance(one, Hidden)
-        else _one(missing.fit, one, velocities, positions, points, close.get(one.slot))
+        else _one(missing.fit, one, velocities, positions, close.get(one.slot), policy)
         for one in missing.functions
     )
 
@@ -154,24 +159,22 @@ def _one(
     one: Free,
     velocities,
     positions,
-    points: int,
     close: CloseForm | None,
+    policy: Policy,
 ) -> MissingFunction:
     family, kind = one.family, _KINDS[one.family.where]
-    labels = [estimate.name for estimate in found.estimates]
-    rows = [labels.index(name) for name in one.coefficients]
-    numbers = np.array([found.estimates[row].value for row in rows])
-    covariance = found.covariance[np.ix_(rows, rows)]
+    numbers = np.array([found[name].value for name in one.coefficients])
+    covariance = covariance_of(found, one.coefficients, policy)
     arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
     # a table of two arguments has half as many points along each of them
-    points = points // 2 if len(arguments) > 1 else points
+    points = policy.shape_points // 2 if len(arguments) > 1 else policy.shape_points
     along = np.linspace(family.low, family.high, points)
     if one.primitive is not None:
-        along = _graded(along, lambda x: _curve(one, x, numbers)[0])
-    value, basis = _curve(one, along, numbers)
-    error = _errors(basis, covariance)
+        along = graded(along, lambda x: curve(one, x, numbers)[0])
+    value, basis = curve(one, along, numbers)
+    error = errors_of(basis, covariance)
     if one.primitive is None:
-        level = _errors(_level(family, along, basis), covariance)
+        level = errors_of(level_of(family, along, basis), covariance)
         words, formula = _words(family, kind, along, value, level), None
         if np.median(error) > _UNDETERMINED * np.median(level):
             error = level
@@ -192,7 +195,7 @@ def _one(
             Factor.DIRECTION: lambda x: np.tanh(x / family.slip),
             Factor.DEFLECTION: lambda x: x - family.middle,
         }[family.factor]
-        across = _graded(np.linspace(ends[0], ends[1], points), factor_at)
+        across = graded(np.linspace(ends[0], ends[1], points), factor_at)
         factor, grid = factor_at(across), (along, across)
         value, error = np.outer(value, factor), np.outer(error, np.abs(factor))
     return MissingFunction(
@@ -211,24 +214,6 @@ def _one(
     )
 
 
-def _errors(basis, covariance):
-    """Return the standard errors of linear combinations (rows) of coefficients."""
-    return np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
-
-
-def _level(family: Family, along, values):
-    """Return functions (columns) without the part that rig parameters can represent:
-    a constant, and a straight line if the argument is a position or velocity.
-    """
-    return values - np.vander(along, _degree(family) + 1) @ np.polyfit(
-        along, values, _degree(family)
-    )
-
-
-def _degree(family: Family) -> int:
-    return 0 if family.periodic or family.argument is Variable.TIME else 1
-
-
 def _formula(found: Fit, form: Free) -> tuple[str, str]:
     """Return the formula of a fitted form, and a sentence about it."""
     assert form.primitive is not None
@@ -243,23 +228,6 @@ def _gap_name(found: Fit, family: Family) -> str:
     if family.where not in (Where.IMPACT, Where.CONTACT) or gaps_of(problem) < 2:
         return ""
     return problem.model.system.constraint_name(family.constraint)
-
-
-def _graded(even: np.ndarray, function) -> np.ndarray:
-    """Return the given number of points, with a function almost linear between them.
-
-    The points are equidistant along the graph of the function, with both axes scaled
-    to their ranges, so that several points lie on a step.
-    """
-    points = len(even)
-    fine = np.linspace(even[0], even[-1], _FINER * points)
-    value = np.asarray(function(fine))
-    size = np.ptp(value)
-    if not np.all(np.isfinite(value)):
-        return even
-    rise = np.abs(np.diff(value)) / (size if size > 0 else 1.0)
-    passed = np.append(0.0, np.cumsum(rise + 1 / len(fine)))
-    return np.interp(np.linspace(0.0, passed[-1], points), passed, fine)
 
 
 def named_function(found: Fit, one: Free | Hidden) -> str:
@@ -286,32 +254,7 @@ def slopes_of_function(
     along = jnp.linspace(term.low, term.high, points)
     direction = jnp.tanh(along / term.slip) * term.jumping
     numbers = jnp.stack(term.coefficients[: len(one.numbers)])
-    return np.asarray(_with_slopes(term, along, direction, numbers)[1])
-
-
-def _curve(one: Free, along, numbers):
-    """Return the function without its factor, and its derivatives with respect to its
-    parameters.
-    """
-    family = one.family
-    direction = np.tanh(along / family.slip) if family.jumps else np.zeros(len(along))
-    term = free_term(family, one.slot, one.primitive).exact()
-    made = _with_slopes(term, np.asarray(along), direction, np.asarray(numbers))
-    return tuple(map(np.asarray, made))
-
-
-@program
-def _with_slopes(term: FreeFunction, along, direction, numbers):
-    """Return a function without its factor, and its derivatives with respect to its
-    first coefficients.
-    """
-
-    def values(numbers):
-        every = (*numbers, *term.coefficients[len(numbers) :])
-        fresh = eqx.tree_at(lambda f: f.coefficients, term, every).prepared()
-        return jax.vmap(fresh.at)(along, direction)
-
-    return values(numbers), jax.jacfwd(values)(numbers)
+    return np.asarray(with_slopes(term, along, direction, numbers)[1])
 
 
 def _unit(family: Family) -> str:
@@ -336,12 +279,12 @@ def _words(family: Family, kind: str, along, value, error) -> str:
     else:
         what = f"{_VERBS[kind]} that depends on the {of}"
     # the part that rig parameters can represent cannot be located
-    level = _level(family, along, value)
+    level = level_of(family, along, value)
     sure = np.abs(level) > 2 * error
     k = int(np.argmax(np.where(sure, np.abs(level), -1.0)))
     if not np.any(sure):
         return f"{what}; its location is unclear"
-    usual = "a constant" if _degree(family) == 0 else "a straight line"
+    usual = "a constant" if degree_of(family) == 0 else "a straight line"
     return (
         f"{what}; it differs most from {usual} at {family.argument} {along[k]:.3g}, "
         f"by {level[k]:.2g} +- {error[k]:.1g}"

@@ -146,9 +146,7 @@ def _of_functions(
         needs.lost,
         policy.small,
     )
-    functions = missing_functions(
-        missing, velocities, positions, policy.shape_points, close
-    )
+    functions = missing_functions(missing, velocities, positions, close, policy)
     divided = shares(bare.fit, found, needs.lost, 0.0, policy)
     effects = missing_effects(trials, functions, missing, needs, choice, divided)
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
