@@ -17,8 +17,9 @@
 # cannot occur, are excluded. The models that A4 also needs are in
 # `textbook_models.py`.
 #
-# Four of the data sets are public; the marble is from a student project. The package contains only those of the pendulum, reduced to
-# every tenth sample (`jaxcam.data.PENDULUM`):
+# Four of the data sets are public; the marble is from a student project. The package
+# contains only the recordings of the pendulum, reduced to every tenth sample
+# (`jaxcam.data.PENDULUM`):
 #
 # - `pendulum`: github.com/dynamicslab/MultiArm-Pendulum (MIT), arXiv:2205.06231;
 # - `ball_drop`: github.com/briandesilva/discovery-of-physics-from-data (MIT);
