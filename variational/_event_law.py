@@ -48,7 +48,9 @@ def completed_law(system: HybridSystem, constraint) -> Callable:
 
 
 def field_of(system: HybridSystem, contact: Bool[Array, " m"] | None) -> Callable:
-    """Return the vector field of free flight, or of contact with marked constraints."""
+    """Return the vector field of free flight, or of contact with the constraints marked
+    in `contact`.
+    """
     if contact is None:
         return system.vector_field
     return lambda t, x: field_in_force(system, t, x, contact)
@@ -78,8 +80,9 @@ def onto_contact(
     constraints in contact.
 
     A state in contact is not changed, but the derivative of the step projects
-    perturbations onto those allowed by contact: its rank falls by two for each
-    constraint, while the dependence of the contact state on the parameters remains.
+    perturbations onto those allowed by contact. The rank of this derivative falls by
+    two for each constraint, while the dependence of the contact state on the parameters
+    remains.
     """
     values = gaps(system, t, x)
     normals = jax.jacfwd(lambda y: gaps(system, t, y))(x)
@@ -95,8 +98,8 @@ def onto_contact(
 def contact_projector(
     system: HybridSystem, t, x, contact: Bool[Array, " m"]
 ) -> Float[Array, "n n"]:
-    """Return the derivative of `onto_contact`, which is exactly zero for a system of
-    two states in contact.
+    """Return the derivative of `onto_contact`; for a system of two states in contact,
+    the derivative is exactly zero.
     """
     out = jax.jacfwd(lambda y: onto_contact(system, t, y, contact))(x)
     if x.shape[0] == 2:

@@ -1,5 +1,5 @@
-"""A fold curve and a flip curve in the plane of two parameters: between the two curves,
-the orbit with one impact per period is stable."""
+"""A fold curve and a flip curve in a two-parameter plane (wall position and forcing
+frequency): between the two curves, the orbit with one impact per period is stable."""
 
 import continuation
 from jaxcam.models import ImpactOscillator

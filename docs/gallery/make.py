@@ -31,7 +31,7 @@ ORDER = tuple((HERE / "order.txt").read_text("utf-8").split())
 # titles of the figures whose script names are not good titles
 TITLES = {
     "cam_follower_chart": "Cam-follower chart",
-    "curves_in_two_parameters": "Bifurcation curves in the plane of two parameters",
+    "curves_in_two_parameters": "Bifurcation curves in a two-parameter plane",
     "fit_with_band": "Fit with noise band",
     "stick_slip": "Stick-slip",
 }

@@ -1,5 +1,6 @@
 """The two Floquet multipliers along a branch: one enters the unit circle through +1 at
-a fold, both move along a circle of radius r, and one leaves through –1 at a flip."""
+a fold, both move along a circle whose radius is the coefficient of restitution, and one
+leaves the unit circle through –1 at a flip."""
 
 import matplotlib.pyplot as plt
 import numpy as np

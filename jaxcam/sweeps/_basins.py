@@ -36,8 +36,8 @@ def basins(
 
     Motions are simulated and sampled once per period. Periodic motions are on the same
     attractor if their orbits are equal; other motions are on the same attractor if they
-    visit common cells. The result does not depend on the order of the states, on the
-    blocks or on the executor.
+    visit at least one cell of state space in common. The result does not depend on the
+    order of the states, on the blocks or on the executor.
 
     Args:
         system: A hybrid system, or a section that is sampled once per period.

@@ -19,9 +19,11 @@ from .sections import AbstractSection, component_coordinates
 
 
 _SHOWN = 64
-"""Maximum number of points kept of each attractor."""
+"""Maximum number of points kept for each attractor."""
 _ALIKE = 0.05
-"""Distance, in units of the scale, below which an orbit counts as a known one."""
+"""Distance, in units of the scale, below which an orbit is regarded as identical to a
+known orbit.
+"""
 
 
 def together(job: BasinsJob, store: Store, known: Basins | None) -> xarray.Dataset:
@@ -99,7 +101,8 @@ def _orbits(section: AbstractSection, starts, job: BasinsJob) -> np.ndarray:
 
 
 def _renumbered(number, found: Attractors, orbit, known: Basins):
-    """Renumber attractors as in the `known` basins; those not found there are appended.
+    """Renumber the attractors as in the `known` basins; attractors that are not known
+    are appended.
 
     **Returns:** the attractor number of each state; the labels and orbits of all
     attractors.

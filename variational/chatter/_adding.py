@@ -16,24 +16,25 @@ from ._scalar import check_chatter_system
 def adding_thresholds(
     system: HybridSystem, where: Where, interruption, beyond, count: int = 8
 ) -> Float[Array, " count"]:
-    """Return the parameter values at which the orbit from release grazes and loses an
-    impact.
+    """Return the parameter values at which the orbit that starts at release grazes and
+    loses an impact.
 
     Beyond the interruption, the motion that starts at release has finitely many impacts
-    before the next release. Their number falls by one where one of them grazes; these
-    parameter values converge to the interruption geometrically, with the ratio q of
-    [`variational.scaling_law`][].
+    before the next release. The number of impacts falls by one where one of them
+    grazes. The parameter values at which this happens converge geometrically to the
+    interruption, with the ratio q of [`variational.scaling_law`][].
 
     Args:
         system: As in [`variational.chatter_interruption`][].
         where: As in [`variational.chatter_interruption`][].
         interruption: The parameter value at which complete chatter ends.
-        beyond: A value on the interrupted side; thresholds between it and
+        beyond: A value on the interrupted side; thresholds between this value and
             `interruption` are found.
         count: Number of thresholds.
 
     Returns:
-        The values in the unit of the parameter, farthest first, shape `(count,)`.
+        The values in the unit of the parameter, in order of decreasing distance from
+        `interruption`, shape `(count,)`.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator

@@ -1,4 +1,6 @@
-"""Compute the derivatives of the state at the end of a period, from its pieces."""
+"""Compute the derivatives of the state at the end of a period from the pieces of the
+motion.
+"""
 
 from collections.abc import Callable
 
@@ -86,7 +88,7 @@ def by_product(system, values, where, state, pieces: TurnPieces, sticks):
 def by_flow(
     system, values, where, state, t0, period, settings: Settings, sticks: bool
 ) -> TurnDerivative:
-    """Return the derivatives over one period from differentiating the event loop."""
+    """Differentiate the event loop and return the derivatives over one period."""
     made = _by_flow(system, values, where, state, t0, period, as_arrays(settings))
     by_state, by_start, by_length, by_parameter = made
     return TurnDerivative(

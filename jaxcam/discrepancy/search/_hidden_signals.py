@@ -11,11 +11,12 @@ from scipy.signal import lfilter, savgol_filter
 from ...fitting import Problem
 
 
-# Window (samples) of the quadratic polynomials that smooth a flight. They cause no
-# delay, and they suppress only frequencies far above those that the integration steps
-# resolve
+# Window (samples) of the quadratic polynomials that smooth a flight. The smoothing
+# causes no delay, and it suppresses only frequencies far above those that the
+# integration steps resolve
 _WINDOW = 9
-# Samples are padded to a multiple of this, so that similar recordings share a program
+# Recordings are padded to a multiple of this number of samples, so that recordings of
+# similar length share a compiled program
 _STRIDE = 2048
 
 
@@ -23,7 +24,7 @@ _STRIDE = 2048
 class Driven:
     """The measured position of each recording at equidistant times.
 
-    `position` `(r, n)`, the last value repeated if a recording is shorter than others;
+    `position` `(r, n)`: positions, padded with the last value of each recording;
     `begin`, `interval` `(r,)`: start and step of the times; `spread`: largest distance
     of the positions from their `middle`; `motion_unit`: unit of the position.
     """
@@ -61,8 +62,8 @@ def driven_by(problem: Problem, motion_unit: str = "") -> Driven | None:
 
 
 def _smooth(part, channel: str) -> Float[np.ndarray, " n"]:
-    """Return one recording at equidistant times; no polynomial extends across an
-    impact.
+    """Return a channel of one recording at equidistant times, smoothed in each flight
+    by local polynomials, none of which extends across an impact.
     """
     record = part.recording
     time, interval = record.time, record.interval
@@ -81,9 +82,11 @@ def _smooth(part, channel: str) -> Float[np.ndarray, " n"]:
 
 
 def resonance_signals(driven: Driven, frequency: float, ratio: float):
-    """Return the outputs z, z' of `z'' + 2 D w z' + w^2 z = q`, and its free motions.
+    """Return the outputs z, z' of `z'' + 2 D w z' + w^2 z = q`, and two independent
+    free responses.
 
-    The result is exact for a position that is linear between samples; the element
+    Here, q is the measured position, w the angular frequency and D the damping `ratio`.
+    The outputs are exact for a position that is linear between samples; the element
     starts at rest.
 
     **Returns:** two arrays `(r, n, 2)`.
@@ -102,7 +105,9 @@ def resonance_signals(driven: Driven, frequency: float, ratio: float):
 
 
 def relaxation_signals(driven: Driven, time: float):
-    """Return the output and free motion of `z' = v - z / time`, both `(r, n, 1)`."""
+    """Return the output and the free response of `z' = v - z / time`, where v is the
+    measured velocity, both `(r, n, 1)`.
+    """
     pole = complex(-1 / time)
     filtered, free = [], []
     for position, interval in zip(driven.position, driven.interval):
@@ -113,7 +118,7 @@ def relaxation_signals(driven: Driven, time: float):
 
 
 def _first_order(position, pole: complex, interval: float):
-    """Solve `y' = pole y + q`, starting from rest."""
+    """Solve `y' = pole y + q`, where q is the position, starting from rest."""
     x = pole * interval
     end = np.exp(x)
     last = (end - 1 - x) / (x * pole)

@@ -1,4 +1,4 @@
-"""The problem of any system, as defined by its setup."""
+"""Form the question of a diagnosis for an arbitrary system or its setup."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -42,8 +42,8 @@ from ._question import (
 )
 
 
-# Slip speed as a fraction of the usual change of speed per step, so that the impulse of
-# dry friction is integrated accurately enough
+# Slip speed as a fraction of the typical change of speed per step, so that the impulse
+# of dry friction is integrated accurately enough
 _RESOLVED = 0.3
 
 
@@ -55,10 +55,10 @@ def setup_question(
     policy: Policy,
     location: Location = Location(),
 ) -> Question:
-    """Return the problem of a rig with any system; the setup contains sensors and
-    tolerances.
+    """Return the question of a diagnosis for an arbitrary system, given by a setup with
+    its sensors and tolerances.
 
-    **Raises:** `RecordingError` for recordings that cannot be those of the rig.
+    **Raises:** `RecordingError` if the recordings cannot be those of the rig.
     """
     runs = tuple(recordings)
     refuse_one(runs)
@@ -94,13 +94,14 @@ def system_question(
     drive_channel: str | None = None,
     location: Location = Location(),
 ) -> Question:
-    """Return the problem of any system; terms of the library act on the coordinate and
-    the gap of a `location`.
+    """Return the question of a diagnosis for an arbitrary system; terms of the library
+    act on the coordinate and the gap of a `location`.
 
-    **Arguments:** as for `diagnose`; the `stated` constants of the terms, by name; the
-    channel of a rotating drive, which is searched for ripple; the location.
+    **Arguments:** as for `diagnose`, and three more. `stated` gives constants of the
+    terms by name. `drive_channel` is the channel of a rotating drive, which is searched
+    for ripple. `location` is the place at which missing physics is sought.
 
-    **Raises:** `ValueError` for recordings that are not segmented, or without sensors.
+    **Raises:** `ValueError` if a recording is not segmented or no sensors are given.
     """
     if not sensors:
         raise ValueError(
@@ -177,8 +178,9 @@ def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, An
 def _resolved_slip(problem: Problem, channel: str) -> float:
     """Return the smallest slip speed that the steps of a flight resolve.
 
-    When a body stops, a friction force that changes sign over a slip speed is
-    temporarily too small. The slip speed is therefore as low as the steps allow.
+    A smoothed friction force changes sign over a velocity range of the order of the
+    slip speed, so it is too small while the body comes to rest. The slip speed is
+    therefore set as low as the steps allow.
     """
     pieces = problem.pieces
     step = float(np.median(np.asarray(pieces.flown.step)[np.asarray(pieces.exists)]))

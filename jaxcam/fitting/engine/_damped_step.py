@@ -26,7 +26,7 @@ def damped_step(problem, columns, blocks, point, damping, prior):
     for r, (place, local) in enumerate(zip(columns.place, columns.local)):
         used = place >= 0
         values[r, local[used]] += change[place[used]] * columns.scale[place[used]]
-    # the decrease of the cost that its quadratic model predicts for the full step
+    # the decrease that the quadratic model of the cost predicts for the full step
     gain = float(change @ score) + _state_gain(blocks, found)
     moved = Point(jnp.asarray(values), point.states + states)
     return moved, gain
@@ -34,7 +34,7 @@ def damped_step(problem, columns, blocks, point, damping, prior):
 
 def _state_gain(blocks: Blocks, found) -> float:
     """Return the predicted decrease of the cost due to the states at unchanged
-    parameters: the product of their scores and steps.
+    parameters: the product of the scores and the steps of the states.
     """
     none = jnp.zeros((found.score.shape[0], found.score.shape[1]))
     return float(jnp.sum(blocks.s * state_steps(found, none)))

@@ -1,8 +1,8 @@
 """Collect operations on scalars, and trace those on which a result depends.
 
 An operation that is repeated with the same operands is stored only once. It is traced
-only when its value is `forced`, because tracing takes far longer than storing and array
-programs compute many elements on which nothing depends.
+only when its value is `forced`, because tracing takes far longer than storing, and
+array programs compute many elements on which no result depends.
 """
 
 import functools
@@ -49,9 +49,9 @@ class Memory:
 
     def __init__(self):
         self.made: dict[Any, Scalar] = {}
-        # the scalars of elements of long arrays
+        # the scalars that represent elements of long arrays
         self.parts: dict[Any, Scalar] = {}
-        # the scalars of traced values, keyed by the `id` of each value
+        # the scalars that represent traced values, keyed by the `id` of each value
         self.traced: dict[int, Scalar] = {}
 
     @no_type_check
@@ -115,7 +115,9 @@ def _place(key):
 
 @no_type_check
 def forced(element, memory: Memory):
-    """Return the traced value of a scalar; other elements are values already."""
+    """Return the traced value of a scalar; other elements are already values and are
+    returned unchanged.
+    """
     if isinstance(element, Part):
         element = memory.scalar(element)
     if not isinstance(element, Scalar):
@@ -160,7 +162,8 @@ def _defaults(name: str) -> dict:
 @no_type_check
 def _identity(name, scalars):
     """Return the simplified result of an operation with a known number, such as zero or
-    one, or with equal cases; otherwise `None`. Differentiation leaves many of these.
+    one, or with equal cases; otherwise `None`. Differentiation produces many such
+    operations.
     """
     if name == "select_n":
         which, *cases = scalars
