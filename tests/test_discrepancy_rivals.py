@@ -1,12 +1,15 @@
 """Rival functions, forms with sharp edges, and decoys."""
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from benchmarks.own_rigs import RIGS
 from benchmarks.unnamed import hidden_case, judged
-from jaxcam.discrepancy import diagnose
+from jaxcam.discrepancy import diagnose, Policy
+from jaxcam.discrepancy.evidence import _rivals
 from jaxcam.discrepancy.search._local_force import _in_reverse, Response
 from jaxcam.discrepancy.terms import Place
 from jaxcam.discrepancy.terms._primitives import PRIMITIVES
@@ -52,3 +55,20 @@ def test_a_sharp_edge_is_found_behind_a_smooth_rival(rig, effect):
     hidden, runs, motions, _ = hidden_case(rig, setup, effect, 0)
     right, why = judged(diagnose(setup, runs), hidden, motions)
     assert right, why
+
+
+def test_the_choice_with_an_additional_term_is_no_rival(monkeypatch, unchecked_types):
+    """Another function is one, even with a larger score."""
+    monkeypatch.setattr(_rivals, "_costs", lambda fit, policy: np.ones((2, 2)))
+
+    def fitted(label, score, names=()):
+        part = SimpleNamespace(label=label, primitive=None)
+        return SimpleNamespace(
+            functions=(part,), names=frozenset(names), fit=None, score=score
+        )
+
+    found = fitted("flight velocity", 10.0)
+    nested = fitted("flight velocity", 9.0, {"sensor_lag"})
+    other = fitted("flight position", 12.0)
+    kept = _rivals.rivals(found, [nested, other, found], Policy(), 0)
+    assert [one.missing for one in kept] == [other]

@@ -39,9 +39,9 @@ def rivals(
     )
     kept: list[Missing] = []
     for one in ranked:
-        if _parts(one) != _parts(found) and all(
-            _parts(one) != _parts(other) for other in kept
-        ):
+        # the choice with an additional part is no alternative: that part was left out
+        nested = _parts(found) <= _parts(one)
+        if not nested and all(_parts(one) != _parts(other) for other in kept):
             kept.append(one)
     kept = kept[: policy.alternatives]
     costs = [_costs(one.fit, policy) for one in (found, *kept)]

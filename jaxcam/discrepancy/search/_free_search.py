@@ -76,6 +76,8 @@ class FreeSearch:
         faults = own_faults(self.problem.model, self.problem.parameters)
         self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
+        # far from the data, the predicted gains of elements are not reliable
+        self.roughly = already_loose(problem.extras)
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
@@ -180,9 +182,9 @@ class FreeSearch:
         """
         if self.need.preferred or not self.falls_short(found):
             return self.need.preferred
-        if found is not None and already_loose(self.problem.extras):
-            if found.fit.cost < self.policy.little * self.cost:
-                return False
+        if self.roughly:
+            left = self.cost if found is None else found.fit.cost
+            return left > self.policy.little * self.cost
         least = self._least()
         if found is not None:
             least = max(least, self._small(found) / heat_of(found.fit))
@@ -213,7 +215,8 @@ class FreeSearch:
             if self.first is None:
                 self.first = leads
                 gains = [lead.gain for lead in leads]
-                self.need.compare(problem, found, gains, self._least())
+                if not self.roughly:
+                    self.need.compare(problem, found, gains, self._least())
                 if self.need.preferred:
                     break
             best = found
