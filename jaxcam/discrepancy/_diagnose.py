@@ -173,17 +173,18 @@ def _answered(
         ripple = ripple_of(
             question.drives, question.drive_noise, question.drive_channel, policy
         )
-    trials, rough = _trials(question, report, keep, policy), None
-    bare = trials.attempt(frozenset(), None, policy.iterations)
-    if bare is not None and far_from_data(bare.fit, policy):
+    trials = _trials(question, report, keep, policy)
+    best = Search(trials).run()
+    bare = trials.known[frozenset()]
+    if far_from_data(bare.fit, best.fit, policy):
         rough = _roughly(question, bare, seed, report, keep, policy)
         if not rough.choice.explained(policy):
             return diagnosis_of(case, *rough, ripple)
-        # the physics was found, so the search is repeated with the stated noise
-        trials.attempt(rough.choice.best.names, rough.choice.best, policy.iterations)
-    best = Search(trials).run()
-    if rough is not None and rough.choice.missing is None:
-        if far_from_data(best.fit, policy):
+        # the physics was found, so that the stated noise can be used
+        names = rough.choice.best.names
+        again = trials.attempt(names, rough.choice.best, policy.iterations)
+        best = again if again is not None and again.bic < best.bic else best
+        if rough.choice.missing is None and far_from_data(bare.fit, best.fit, policy):
             return diagnosis_of(case, *rough, ripple)
     choice = choose(question, trials, best, seed)
     return diagnosis_of(case, question, trials, choice, ripple)

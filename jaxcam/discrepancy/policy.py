@@ -139,8 +139,8 @@ class Policy:
 
     model_error: float = decides(
         100.0,
-        "rms residual of the textbook model, in units of the noise, above which model "
-        "errors are allowed for",
+        "rms residual with the best named terms, in units of the noise, above which "
+        "model errors are allowed for",
     )
     resolved: float = decides(
         0.03,

@@ -25,9 +25,18 @@ from ._question import ModelError, Question, with_noise
 _ROUNDS, _CONSISTENT = 12, 2.0
 
 
-def far_from_data(found: Fit, policy: Policy) -> bool:
-    """Return whether a fit is so far from the data that model errors dominate."""
-    return not found.cost < policy.model_error**2 * found.problem.samples
+def far_from_data(bare: Fit, best: Fit, policy: Policy) -> bool:
+    """Return whether a fit is so far from the data that model errors dominate.
+
+    Named terms that explain nearly all of the misfit count, although what they leave
+    may be large compared with the noise.
+
+    **Arguments:** the fits without terms and with the best ones; the policy.
+    """
+    samples = best.problem.samples
+    if best.cost < policy.model_error**2 * samples:
+        return False
+    return not best.cost - samples < policy.small * (bare.cost - samples)
 
 
 def with_model_error(question: Question, policy: Policy) -> Question:
