@@ -9,7 +9,7 @@ import pytest
 from benchmarks.own_rigs import RIGS
 from benchmarks.unnamed import hidden_case, judged
 from jaxcam.discrepancy import diagnose, Policy
-from jaxcam.discrepancy.evidence import _rivals
+from jaxcam.discrepancy.evidence import _rivals, _unnamed
 from jaxcam.discrepancy.search._local_force import _in_reverse, Response
 from jaxcam.discrepancy.terms import Place
 from jaxcam.discrepancy.terms._primitives import PRIMITIVES
@@ -59,7 +59,7 @@ def test_a_sharp_edge_is_found_behind_a_smooth_rival(rig, effect):
 
 def test_the_choice_with_an_additional_term_is_no_rival(monkeypatch, unchecked_types):
     """Another function is one, even with a larger score."""
-    monkeypatch.setattr(_rivals, "_costs", lambda fit, policy: np.ones((2, 2)))
+    monkeypatch.setattr(_rivals, "_costs", lambda fit, policy: np.ones(4))
 
     def fitted(label, score, names=()):
         part = SimpleNamespace(label=label, primitive=None)
@@ -72,3 +72,28 @@ def test_the_choice_with_an_additional_term_is_no_rival(monkeypatch, unchecked_t
     other = fitted("flight position", 12.0)
     kept = _rivals.rivals(found, [nested, other, found], Policy(), 0)
     assert [one.missing for one in kept] == [other]
+
+
+@pytest.mark.parametrize(
+    ("functions", "named", "preferred"),
+    [
+        # the functions explain most of what is left: no other prediction is needed
+        (0.4, None, False),
+        # both are poor, and the named terms are better
+        (0.9, 0.6, True),
+        (0.9, 0.95, False),
+    ],
+)
+def test_functions_must_not_predict_worse_than_named_terms(
+    functions, named, preferred, monkeypatch, unchecked_types
+):
+    """Held-out rms relative to that of the textbook model."""
+    of_terms = SimpleNamespace(after=named)
+    monkeypatch.setattr(_unnamed, "held_out", lambda trials, before, best: of_terms)
+    trials = SimpleNamespace(policy=Policy())
+    held = SimpleNamespace(before=1.0, after=functions)
+    best = SimpleNamespace(names=frozenset({"quadratic_drag"}))
+    found = _unnamed.rather_named(trials, None, best, held)
+    assert (found is of_terms) == preferred
+    best.names = frozenset()
+    assert _unnamed.rather_named(trials, None, best, held) is None

@@ -6,24 +6,15 @@ from typing import NamedTuple
 
 from ...fitting import Fit
 from ..policy import Policy
-from ..search import (
-    decoys_of,
-    FreeSearch,
-    Missing,
-    Question,
-    Trial,
-    Trials,
-    within_tolerances,
-)
-from ..terms import families, gaps_of
+from ..search import Missing, Question, Trial, Trials, within_tolerances
 from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
 from ._differing import Differing, differing
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
-from ._redrawn import Needs, needs, redrawn, sure
-from ._rivals import Rival, rivals
+from ._redrawn import Needs, redrawn, sure
+from ._rivals import Rival
 from ._structure import Structure, structures
-from ._visited_states import visited_states
+from ._unnamed import rather_named, trial_of, without_a_name
 from ._whole_flights import WholeFlights
 
 
@@ -138,7 +129,7 @@ def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choic
         without = differing(before.fit, trials.policy)
         settled |= _settled(without, left_before, best.bic, trials.policy)
     if left and trials.policy.functions and not settled:
-        missing, needed_parts, others = _without_a_name(
+        missing, needed_parts, others = without_a_name(
             question, trials, best, left, seed
         )
     fewest = _fewest(different, without, best.bic, trials.policy) if left else None
@@ -156,16 +147,17 @@ def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choic
             different, best, left_after, held = without, before, left_before, None
             inclusion, deviation = redrawn(trials, best, seed)
             needed, beyond = [], []
-    after = best.fit if missing is None else missing.fit
-    if after is not before.fit:
-        # report the textbook model with its parameters within their tolerances
-        before = dataclasses.replace(before, fit=_bounded(trials, before.fit, after))
+    textbook = before
+    before = _within(trials, textbook, best.fit if missing is None else missing.fit)
     if missing is not None:
-        different = differing(missing.fit, trials.policy)
-        nameless = Trial(
-            missing.names | {"functions"}, missing.fit, missing.score, 0, False
-        )
-        held = held_out(trials, before, nameless)
+        held = held_out(trials, before, trial_of(missing))
+        rest = _within(trials, textbook, best.fit)
+        named = rather_named(trials, rest, best, held)
+        if named is not None:
+            missing, needed_parts, others = None, None, ()
+            before, held = rest, named
+        else:
+            different = differing(missing.fit, trials.policy)
     held = held or held_out(trials, before, best)
     return Choice(
         found,
@@ -244,106 +236,18 @@ def _instead(trials: Trials, best: Trial, deviation) -> tuple[list[Outside], Tri
     return found, best
 
 
+def _within(trials: Trials, before: Trial, after: Fit) -> Trial:
+    """Return the fit of the textbook model with its parameters within their
+    tolerances, for a comparison with another fit.
+    """
+    if after is before.fit:
+        return before
+    return dataclasses.replace(before, fit=_bounded(trials, before.fit, after))
+
+
 def _bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
     """Return a fit with the rig parameters held within their tolerances."""
     return within_tolerances(less, best, trials.rig, trials.policy)
-
-
-def _without_a_name(
-    question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
-) -> tuple[Missing | None, Needs | None, tuple[Rival, ...]]:
-    """Return the functions that explain the residual of the named terms, chosen by
-    their evidence.
-
-    Two kinds of residual do not count: one near the noise that is small compared with
-    the part explained by a named term, and one that the smoothing of dry friction may
-    leave. Functions that the bootstrap samples do not retain are dropped.
-    """
-    policy, bare = trials.policy, trials.known[frozenset()].fit.cost
-    problem = question.problem
-    near = best.fit.cost < policy.near * problem.samples
-    small = policy.small if near else policy.corner_share
-    if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
-        return None, None, ()
-    visited = visited_states(problem)
-    positions, velocities, approach, duration = visited.ranges(policy)
-    offered = families(
-        positions,
-        velocities,
-        approach,
-        duration,
-        turned=question.turned,
-        gaps=_gaps_with_impacts(question, policy),
-        slip=question.references.slip_speed,
-        motion_unit=question.unit,
-        strides=visited.strides,
-    )
-
-    def searched(elements: bool, policy: Policy = policy):
-        search = FreeSearch(
-            problem,
-            question.rig,
-            question.terms,
-            offered,
-            policy,
-            trials.progress,
-            bare,
-            elements,
-            trials.clock,
-        )
-        return search, *_needed(search, search.run(), best.bic, seed)
-
-    # elements with an internal state are tried only if functions may not suffice
-    always = policy.elements > 1
-    results = [searched(always)]
-    first, found, _ = results[0]
-    if not always and first.lacks_element(found) and not trials.clock.over:
-        results.append(searched(True))
-        second, found, _ = results[-1]
-        if first.need.preferred and second.falls_short(found):
-            # the first search ended before it had tried functions alone
-            results.append(searched(False, dataclasses.replace(policy, elements=0)))
-    kept = [(one, its) for _, one, its in results if one is not None]
-    if not kept:
-        return None, None, ()
-    chosen, its_needs = min(kept, key=lambda each: each[0].score)
-    tried = [one for search, _, _ in results for one in search.tried]
-    return chosen, its_needs, rivals(chosen, tried, policy, seed)
-
-
-def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:
-    """Return the gaps at which functions are sought: none if there are no impacts,
-    otherwise the first gaps and the gap of the location.
-    """
-    problem = question.problem
-    if not any(len(part.impacts.approach) for part in problem.segments):
-        return ()
-    first = range(min(gaps_of(problem), policy.functions))
-    return tuple(sorted({*first, question.location.constraint}))
-
-
-def _needed(
-    search: FreeSearch, found: Missing | None, bic: float, seed: int
-) -> tuple[Missing | None, Needs | None]:
-    """Drop functions and terms that the bootstrap samples do not retain.
-
-    **Returns:** the fit with the others, and their bootstrap results; `None` for both
-    if no function is left, or if the score of the fit is not below `bic`.
-    """
-    policy = search.policy
-    while found is not None and found.functions and found.score < bic:
-        parts, prices = search.fits.parts(found), search.fits.prices(found)
-        fitted = found.fit
-        needed = needs(
-            fitted.problem, fitted, parts, prices, policy, seed, names=fitted.free
-        )
-        least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
-        if needed.inclusion[least] >= policy.sure:
-            return found._replace(decoys=decoys_of(search.first or (), found)), needed
-        if len(parts) < 2:
-            break
-        found = search.without(found, least)
-    return None, None
 
 
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:

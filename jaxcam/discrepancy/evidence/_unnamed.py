@@ -1,0 +1,134 @@
+"""Seek unnamed functions that explain the residual of the named terms."""
+
+import dataclasses
+
+from ..policy import Policy
+from ..search import decoys_of, FreeSearch, Missing, Question, Trial, Trials
+from ..terms import families, gaps_of
+from ._held_out import held_out, HeldOut
+from ._redrawn import Needs, needs
+from ._rivals import Rival, rivals
+from ._structure import Structure
+from ._visited_states import visited_states
+
+
+def without_a_name(
+    question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
+) -> tuple[Missing | None, Needs | None, tuple[Rival, ...]]:
+    """Return the functions that explain the residual of the named terms, chosen by
+    their evidence.
+
+    Two kinds of residual do not count: one near the noise that is small compared with
+    the part explained by a named term, and one that the smoothing of dry friction may
+    leave. Functions that the bootstrap samples do not retain are dropped.
+    """
+    policy, bare = trials.policy, trials.known[frozenset()].fit.cost
+    problem = question.problem
+    near = best.fit.cost < policy.near * problem.samples
+    small = policy.small if near else policy.corner_share
+    if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
+        return None, None, ()
+    visited = visited_states(problem)
+    positions, velocities, approach, duration = visited.ranges(policy)
+    offered = families(
+        positions,
+        velocities,
+        approach,
+        duration,
+        turned=question.turned,
+        gaps=_gaps_with_impacts(question, policy),
+        slip=question.references.slip_speed,
+        motion_unit=question.unit,
+        strides=visited.strides,
+    )
+
+    def searched(elements: bool, policy: Policy = policy):
+        search = FreeSearch(
+            problem,
+            question.rig,
+            question.terms,
+            offered,
+            policy,
+            trials.progress,
+            bare,
+            elements,
+            trials.clock,
+        )
+        return search, *_needed(search, search.run(), best.bic, seed)
+
+    # elements with an internal state are tried only if functions may not suffice
+    always = policy.elements > 1
+    results = [searched(always)]
+    first, found, _ = results[0]
+    if not always and first.lacks_element(found) and not trials.clock.over:
+        results.append(searched(True))
+        second, found, _ = results[-1]
+        if first.need.preferred and second.falls_short(found):
+            # the first search ended before it had tried functions alone
+            results.append(searched(False, dataclasses.replace(policy, elements=0)))
+    kept = [(one, its) for _, one, its in results if one is not None]
+    if not kept:
+        return None, None, ()
+    chosen, its_needs = min(kept, key=lambda each: each[0].score)
+    tried = [one for search, _, _ in results for one in search.tried]
+    return chosen, its_needs, rivals(chosen, tried, policy, seed)
+
+
+def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:
+    """Return the gaps at which functions are sought: none if there are no impacts,
+    otherwise the first gaps and the gap of the location.
+    """
+    problem = question.problem
+    if not any(len(part.impacts.approach) for part in problem.segments):
+        return ()
+    first = range(min(gaps_of(problem), policy.functions))
+    return tuple(sorted({*first, question.location.constraint}))
+
+
+def _needed(
+    search: FreeSearch, found: Missing | None, bic: float, seed: int
+) -> tuple[Missing | None, Needs | None]:
+    """Drop functions and terms that the bootstrap samples do not retain.
+
+    **Returns:** the fit with the others, and their bootstrap results; `None` for both
+    if no function is left, or if the score of the fit is not below `bic`.
+    """
+    policy = search.policy
+    while found is not None and found.functions and found.score < bic:
+        parts, prices = search.fits.parts(found), search.fits.prices(found)
+        fitted = found.fit
+        needed = needs(
+            fitted.problem, fitted, parts, prices, policy, seed, names=fitted.free
+        )
+        least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
+        if needed.inclusion[least] >= policy.sure:
+            return found._replace(decoys=decoys_of(search.first or (), found)), needed
+        if len(parts) < 2:
+            break
+        found = search.without(found, least)
+    return None, None
+
+
+def trial_of(missing: Missing) -> Trial:
+    """Return a fit with functions as a trial, for a prediction of held-out data."""
+    names = missing.names | {"functions"}
+    return Trial(names, missing.fit, missing.score, 0, False)
+
+
+def rather_named(
+    trials: Trials, before: Trial, best: Trial, held: HeldOut
+) -> HeldOut | None:
+    """Return the prediction of held-out data by the named terms, if it is better than
+    that by functions.
+
+    Functions of the time, or of a state visited only once, may explain the recordings
+    and yet predict nothing. The prediction by named terms is computed only if that by
+    functions is hardly better than that of the textbook model.
+
+    **Arguments:** the fits without and with the named terms; the prediction by the
+    functions.
+    """
+    if not best.names or held.after < trials.policy.explains * held.before:
+        return None
+    named = held_out(trials, before, best)
+    return named if named.after < held.after else None
