@@ -10,8 +10,16 @@ from scipy.integrate import solve_ivp
 
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
+from jaxcam.discrepancy._diagnose import _again
 from jaxcam.discrepancy.report import Reason
-from jaxcam.discrepancy.search import far_from_data, system_question, with_model_error
+from jaxcam.discrepancy.search import (
+    far_from_data,
+    KeptTrials,
+    system_question,
+    Trials,
+    with_model_error,
+)
+from jaxcam.discrepancy.search._blocks import _diverging, blocks_of
 from jaxcam.fitting import fit, Parameter, Sensor
 from jaxcam.fitting.engine import allowing, JOINT, separated
 from jaxcam.recordings import Recording, segment
@@ -72,18 +80,26 @@ def _terms(*names):
     return [term for term in library(turned=False) if term.name in names]
 
 
-@pytest.fixture(scope="module")
-def question():
+def _silent(sentence, fraction):
+    pass
+
+
+def _question(parts, noise=_NOISE):
     return system_question(
         Swing(),
-        tuple(_segments(_bumps)),
+        tuple(parts),
         _terms("nonlinear_spring"),
-        {"angle_rad": Sensor(0, noise=_NOISE)},
+        {"angle_rad": Sensor(0, noise=noise)},
         _PARAMETERS,
         None,
-        lambda sentence, fraction: None,
+        _silent,
         Policy(),
     )
+
+
+@pytest.fixture(scope="module")
+def question():
+    return _question(_segments(_bumps))
 
 
 def test_joints_that_allow_for_errors_keep_their_proportions(question):
@@ -115,6 +131,7 @@ def test_noise_and_joints_are_as_large_as_the_errors(question):
         bare, dataclasses.replace(bare, cost=0.02 * bare.cost), policy
     )
     found = with_model_error(question, policy)
+    assert found is not None
     (one,) = found.model_errors
     before = float(question.problem.model.sensors["angle_rad"].floor)
     assert one.channel == "angle_rad" and one.stated == pytest.approx(before)
@@ -130,6 +147,66 @@ def test_noise_and_joints_are_as_large_as_the_errors(question):
     samples = np.sum(best.costs.flown) / problem.samples
     assert 1 / 3 < cost / samples < 3
     assert math.sqrt(samples) == pytest.approx(1 / policy.resolved, rel=0.2)
+
+
+def test_terms_found_with_larger_noise_are_fitted_with_the_stated_one(question):
+    """The number of pieces in the arrays differs: only the values are passed on."""
+    policy = Policy()
+    rough = with_model_error(question, policy)
+    assert rough is not None
+    names, trials = frozenset({"nonlinear_spring"}), []
+    for one in (rough, question):
+        every = one.problem, one.rig, one.terms, policy, _silent
+        trials.append(Trials(*every))
+    first = trials[0].attempt(names, trials[0].attempt(frozenset(), None))
+    bare = trials[1].attempt(frozenset(), None)
+    again = _again(trials[1], first)
+    assert again.names == names and again.fit.cost < bare.fit.cost
+    assert again.fit.point.states.shape == question.problem.start.states.shape
+
+
+def test_flights_of_one_piece_have_no_joints_to_loosen():
+    """Recordings shorter than a piece: the noise is raised, nothing fails."""
+    parts = []
+    for part in _segments(_bumps):
+        run = part.recording
+        short = Recording(run.name, run.time[:40], {"angle_rad": run["angle_rad"][:40]})
+        parts.append(segment(short, "angle_rad", noise=_NOISE))
+    short = _question(parts)
+    assert not np.any(np.asarray(short.problem.pieces.joint))
+    found = with_model_error(short, Policy())
+    assert found is None or found.model_errors[0].used >= _NOISE
+
+
+def test_errors_that_single_pieces_do_not_show_are_not_allowed_for():
+    """The model has all of the physics: single pieces leave only the noise."""
+    parts = _segments(lambda x, v: 0.0)
+    assert with_model_error(_question(parts), Policy()) is None
+
+
+def test_only_pieces_with_diverging_derivatives_are_left_out(question):
+    """Joints add a million times the information of a piece; one diverging piece, or
+    one that is not finite, is left out alone."""
+    problem = question.problem
+    sharp = problem.extras.sharpness
+    usual = 1 / np.asarray(sharp.piece) ** 2 + 2 / np.asarray(sharp.flight) ** 2
+    ss = np.einsum("rkn,nm->rknm", usual, np.eye(usual.shape[-1]))
+    assert not np.any(_diverging(problem, ss))
+    for wrong in (1e8, np.nan):
+        bad = ss.copy()
+        bad[0, 3] *= wrong
+        found = _diverging(problem, bad)
+        assert found[0, 3] and np.sum(found) == 1
+    blocks = blocks_of(problem, problem.start, 2)
+    assert np.all(np.abs(blocks.information).max((1, 2)) > 0)
+
+
+def test_a_search_with_more_time_continues_with_the_same_fits(question, tmp_path):
+    few, many = (
+        KeptTrials(tmp_path, question.problem, Policy(minutes=m)) for m in (5.0, 60.0)
+    )
+    other = KeptTrials(tmp_path, question.problem, Policy(sure=0.8))
+    assert few.mark == many.mark != other.mark
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from .policy import Policy
 from .report import Diagnosis, diagnosis_of
 from .search import (
     Candidates,
+    Clock,
     far_from_data,
     KeptTrials,
     Question,
@@ -86,6 +87,7 @@ def diagnose(
         raise ValueError(f'`candidates` is "{candidates}"; give terms, or "extended".')
     report = progress or (lambda sentence, fraction: None)
     make_room()
+    clock = Clock(policy.minutes)
 
     def asked(
         runs: Sequence[Recording | Segments],
@@ -103,7 +105,7 @@ def diagnose(
             policy,
             location,
         )
-        return _answered(question, case, seed, report, folder, policy)
+        return _answered(question, case, seed, report, folder, policy, clock)
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
@@ -120,7 +122,8 @@ def diagnose(
         found = set_aside(found, asked(others, folder), odd)
     elif falls_short(found):
         found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
-    if keep is not None:
+    if keep is not None and not clock.stopped:
+        # with more time, an interrupted search may continue from its fits
         shutil.rmtree(keep, ignore_errors=True)
     return found
 
@@ -165,6 +168,7 @@ def _answered(
     report: Report,
     keep: Path | None,
     policy: Policy,
+    clock: Clock,
 ) -> Diagnosis:
     """Search for terms, test the result, and return the diagnosis."""
     ripple = None
@@ -173,21 +177,30 @@ def _answered(
         ripple = ripple_of(
             question.drives, question.drive_noise, question.drive_channel, policy
         )
-    trials = _trials(question, report, keep, policy)
-    best = Search(trials).run()
-    bare = trials.known[frozenset()]
+    trials = _trials(question, report, keep, policy, clock)
+    search = Search(trials)
+    best = search.run()
+    bare, rough = trials.known[frozenset()], None
     if far_from_data(bare.fit, best.fit, policy):
-        rough = _roughly(question, bare, seed, report, keep, policy)
-        if not rough.choice.explained(policy):
-            return diagnosis_of(case, *rough, ripple)
+        rough = _roughly(question, bare, seed, report, keep, policy, clock)
+    if rough is not None and not rough.choice.explained(policy):
+        return diagnosis_of(case, *rough, ripple)
+    if rough is not None and rough.choice.best.names:
         # the physics was found, so that the stated noise can be used
-        names = rough.choice.best.names
-        again = trials.attempt(names, rough.choice.best, policy.iterations)
-        best = again if again is not None and again.bic < best.bic else best
-        if rough.choice.missing is None and far_from_data(bare.fit, best.fit, policy):
-            return diagnosis_of(case, *rough, ripple)
+        again = _again(trials, rough.choice.best)
+        if again is not None and again.bic < best.bic:
+            best = search.refined(again)
     choice = choose(question, trials, best, seed)
+    if rough is not None and rough.finds and not choice.explained(policy):
+        return diagnosis_of(case, *rough, ripple)
     return diagnosis_of(case, question, trials, choice, ripple)
+
+
+def _again(trials: Trials, best: Trial) -> Trial | None:
+    """Fit the terms of another problem, starting from their strengths there."""
+    point = trials.problem.start._replace(values=best.fit.point.values)
+    start = dataclasses.replace(best, fit=dataclasses.replace(best.fit, point=point))
+    return trials.attempt(best.names, start, trials.policy.iterations)
 
 
 class _Roughly(NamedTuple):
@@ -199,6 +212,11 @@ class _Roughly(NamedTuple):
     trials: Trials
     choice: Choice
 
+    @property
+    def finds(self) -> bool:
+        """Whether terms or functions were found."""
+        return bool(self.choice.best.names) or self.choice.missing is not None
+
 
 def _roughly(
     question: Question,
@@ -207,26 +225,29 @@ def _roughly(
     report: Report,
     keep: Path | None,
     policy: Policy,
-) -> _Roughly:
+    clock: Clock,
+) -> _Roughly | None:
     """Choose terms with joints and noise that allow for errors of the model.
 
     **Arguments:** `bare`: the fit of the textbook model to complete flights.
+
+    **Returns:** `None` if single pieces of flight hardly show the errors.
     """
     report("allowing for model errors", None)
     folder = None if keep is None else keep / "with_model_error"
-    question = with_model_error(question, policy)
-    trials = _trials(question, report, folder, policy)
-    choice = choose(question, trials, Search(trials).run(), seed)
-    if not choice.explained(policy):
-        report("fitting complete flights", None)
-        whole = whole_flights(bare.fit, choice.fit, policy)
-        choice = dataclasses.replace(choice, whole=whole)
-    return _Roughly(question, trials, choice)
+    rough = with_model_error(question, policy)
+    if rough is None:
+        return None
+    trials = _trials(rough, report, folder, policy, clock)
+    choice = choose(rough, trials, Search(trials).run(), seed)
+    report("fitting complete flights", None)
+    whole = whole_flights(bare.fit, choice.fit, policy)
+    return _Roughly(rough, trials, dataclasses.replace(choice, whole=whole))
 
 
 def _trials(
-    question: Question, report: Report, keep: Path | None, policy: Policy
+    question: Question, report: Report, keep: Path | None, policy: Policy, clock: Clock
 ) -> Trials:
     kept = None if keep is None else KeptTrials(keep, question.problem, policy)
     problem, rig, terms = question.problem, question.rig, question.terms
-    return Trials(problem, rig, terms, policy, report, kept)
+    return Trials(problem, rig, terms, policy, report, kept, clock)

@@ -18,8 +18,11 @@ def falls_short(found: Diagnosis) -> bool:
 
 
 def _left(found: Diagnosis) -> float:
-    """Return the part of the cost that exceeds the cost of noise alone."""
-    return max(found.after.cost - found.after.problem.samples, 0.0)
+    """Return the part of the cost that exceeds the cost of noise alone, multiplied by
+    the variance of the noise, which may be larger if model errors are allowed for.
+    """
+    excess = max(found.after.cost - found.after.problem.samples, 0.0)
+    return excess * found.noise_floor**2
 
 
 def sought_elsewhere(

@@ -53,6 +53,7 @@ def without_a_name(
             bare,
             elements,
             trials.clock,
+            bool(question.model_errors),
         )
         return search, *_needed(search, search.run(), best.bic, seed)
 

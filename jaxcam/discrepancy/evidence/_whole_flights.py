@@ -12,6 +12,10 @@ from ..search import given_up
 from ..terms import watching
 
 
+# Errors of the joints in successive fits, relative to those of a single piece
+_PARTS = (0.1, 0.01, JOINT)
+
+
 class WholeFlights(NamedTuple):
     """Rms residuals over complete flights in the main channel, in its unit, without
     (`before`) and with (`after`) what was found.
@@ -27,15 +31,18 @@ def whole_flights(before: Fit, after: Fit, policy: Policy) -> WholeFlights:
     **Arguments:** the fit of the textbook model to complete flights; the fit of the
     chosen model, in which the pieces may join inexactly; the policy.
     """
-    problem = after.problem
-    joined = dataclasses.replace(problem, extras=allowing(problem.extras, JOINT))
-    found = fit(
-        joined,
-        free=after.free,
-        start=after.point,
-        iterations=policy.quick_iterations,
-        stop=given_up(problem.samples, policy),
-    )
+    found = after
+    for part in _PARTS:
+        # all joints at once would start too far from the data
+        found = fit(
+            dataclasses.replace(
+                after.problem, extras=allowing(after.problem.extras, part)
+            ),
+            free=after.free,
+            start=found.point,
+            iterations=policy.quick_iterations,
+            stop=given_up(after.problem.samples, policy),
+        )
     return WholeFlights(_rms(before), _rms(found))
 
 

@@ -141,7 +141,9 @@ def model_errors(question: Question, choice: Choice) -> Iterator[Caveat]:
     allowed for.
     """
     whole, unit = choice.whole, question.unit
-    for one in question.model_errors:
+    errors = question.model_errors
+    worst = sorted(errors, key=lambda each: each.residual / each.stated)[-1:]
+    for one in worst:
         more = f", and deviations below {one.used:.3g} were treated as noise"
         yield Caveat(
             Reason.MODEL_ERROR,

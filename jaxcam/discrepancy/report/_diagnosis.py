@@ -126,7 +126,9 @@ class Diagnosis:
     heldout_after: float
     """Rms of the held-out residuals with the effects (in `unit`)."""
     noise_floor: float
-    """Rms of the noise (in `unit`)."""
+    """Rms of the noise that was used (in `unit`); a caveat says if it is larger than
+    the stated noise.
+    """
     unit: str
     """Unit of the residuals."""
     rig: dict[str, Value]

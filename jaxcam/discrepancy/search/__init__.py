@@ -5,6 +5,7 @@ from ._blocks import (
     blocks_of as blocks_of,
     values_of as values_of,
 )
+from ._clock import Clock as Clock
 from ._extended import extended as extended, with_states as with_states
 from ._free_fits import Missing as Missing
 from ._free_search import FreeSearch as FreeSearch

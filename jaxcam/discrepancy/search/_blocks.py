@@ -23,8 +23,8 @@ from ...fitting.engine import (
 # Negative eigenvalue of an information matrix, relative to the largest one, that may be
 # a rounding error
 _ROUNDING = 1e-6
-# Information on the state of a piece, relative to the median, above which its
-# derivatives diverge
+# Information on the state of a piece, relative to that of a usual piece, above which
+# its derivatives diverge
 _DIVERGED = 1e6
 
 
@@ -121,14 +121,24 @@ def _assembled(problem: Problem, weights: Weights, point: Point, local, scales):
         return assemble(*given)[0]
 
     found = equations(weights)
-    size = np.max(np.abs(np.asarray(found.ss)), axis=(-2, -1))
-    counts = weights.flown > 0
-    if not np.any(counts):
-        return found
-    wild = counts & ~(size < _DIVERGED * np.median(size[counts]))
+    wild = (weights.flown > 0) & _diverging(problem, np.asarray(found.ss))
     if not np.any(wild):
         return found
     return equations(Weights(np.where(wild, 0.0, weights.flown), weights.rested))
+
+
+def _diverging(problem: Problem, ss: np.ndarray) -> np.ndarray:
+    """Return the pieces whose information on their own state, of shape `(r, k, n, n)`,
+    is not finite or far exceeds that of the samples and joints of a usual piece.
+    """
+    sharp = problem.extras.sharpness
+    piece = np.asarray(sharp.piece)
+    joints = np.minimum(np.asarray(sharp.flight), np.asarray(sharp.impact))
+    usual = 1 / piece**2 + 1 / np.min(joints, axis=1, keepdims=True) ** 2
+    known = np.abs(np.diagonal(ss, axis1=-2, axis2=-1))
+    # an unlimited or unknown error of a state (NaN) gives no limit
+    large = np.any(known > _DIVERGED * usual, axis=-1)
+    return large | ~np.all(np.isfinite(ss), axis=(-2, -1))
 
 
 def _usable(information: np.ndarray, score: np.ndarray) -> bool:
@@ -138,6 +148,8 @@ def _usable(information: np.ndarray, score: np.ndarray) -> bool:
     most = np.cbrt(np.finfo(float).max)
     if not all(bool(np.all(np.abs(one) < most)) for one in (information, score)):
         return False
+    if not score.size:
+        return True
     least, *_, largest = np.linalg.eigvalsh(information)[[0, -1]]
     return bool(least >= -_ROUNDING * largest)
 

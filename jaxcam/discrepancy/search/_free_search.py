@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from scipy.stats import chi2
 
 from ...fitting import Problem
-from ...fitting.engine import already_loose, Point, separated
+from ...fitting.engine import Point, separated
 from ..policy import Policy
 from ..terms import Family, own_faults, Term, Where
 from ._clock import Clock
@@ -39,8 +39,8 @@ class FreeSearch:
 
     **Arguments:** the problem, names of the rig parameters, candidate terms, families
     of functions, the policy, `progress(sentence, fraction)`, the cost of the model
-    without any of them, whether elements with an internal state are candidates, and the
-    clock that limits the time.
+    without any of them, whether elements with an internal state are candidates, the
+    clock that limits the time, and whether model errors are allowed for.
     """
 
     def __init__(
@@ -54,6 +54,7 @@ class FreeSearch:
         cost: float,
         elements: bool = False,
         clock: Clock | None = None,
+        roughly: bool = False,
     ):
         self.cost, self.clock = cost, clock or Clock(policy.minutes)
         self.policy, self.progress = policy, progress
@@ -77,7 +78,7 @@ class FreeSearch:
         self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
         # far from the data, the predicted gains of elements are not reliable
-        self.roughly = already_loose(problem.extras)
+        self.roughly = roughly
         self.apart = dataclasses.replace(
             self.problem, extras=separated(self.problem.extras)
         )
@@ -182,7 +183,7 @@ class FreeSearch:
         """
         if self.need.preferred or not self.falls_short(found):
             return self.need.preferred
-        if self.roughly:
+        if self.roughly and self.need.driven is not None:
             left = self.cost if found is None else found.fit.cost
             return left > self.policy.little * self.cost
         least = self._least()

@@ -1,5 +1,6 @@
 """Store the fits of a diagnosis, so that an interrupted one can be resumed."""
 
+import dataclasses
 import hashlib
 import os
 import zipfile
@@ -91,6 +92,8 @@ class KeptTrials:
 
 def _mark_of(problem: Problem, policy: Policy) -> str:
     """Return a hash of a problem and its policy."""
+    # more time does not change the fit of a subset
+    policy = dataclasses.replace(policy, minutes=Policy().minutes)
     found = hashlib.sha256(repr((problem.names, policy)).encode())
     found.update(np.asarray(problem.start.values).tobytes())
     for part in problem.segments:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...fitting import Fit, fit, Problem, residuals
-from ...fitting.engine import allowing, FLIGHT, IMPACT
+from ...fitting.engine import allowing, FLIGHT, IMPACT, JOINT, Point
 from ..policy import Policy
 from ._given_up import given_up
 from ._question import ModelError, Question, with_noise
@@ -36,18 +36,30 @@ def far_from_data(bare: Fit, best: Fit, policy: Policy) -> bool:
     samples = best.problem.samples
     if best.cost < policy.model_error**2 * samples:
         return False
-    return not best.cost - samples < policy.small * (bare.cost - samples)
+    if best.cost - samples < policy.small * (bare.cost - samples):
+        return False
+    # the cost of a rounded sample may be large although its residual is not
+    found = _residuals(best).values()
+    return any(not rms < policy.model_error * stated for stated, rms in found)
 
 
-def with_model_error(question: Question, policy: Policy) -> Question:
+def with_model_error(question: Question, policy: Policy) -> Question | None:
     """Return the question with larger noise and looser joints.
 
     The joints are as loose as the errors of the textbook model require: each of their
     components costs as much as a sample. The noise of every channel is at least a
     fraction (`policy.resolved`) of the residual that remains.
+
+    **Returns:** the question, or `None` if single pieces of flight hardly show the
+    errors, so that only complete flights do.
     """
     found, part = _loosely_joined(question.problem, question.rig, policy)
-    errors = _errors(found, policy)
+    errors = tuple(
+        ModelError(name, stated, rms, max(stated, policy.resolved * rms))
+        for name, (stated, rms) in _residuals(found).items()
+    )
+    if not any(one.residual**2 > policy.near * one.stated**2 for one in errors):
+        return None
     model = found.problem.model
     sensors = dict(model.sensors)
     for one in errors:
@@ -73,35 +85,39 @@ def _loosely_joined(
     kinds = np.asarray(problem.pieces.joint)
     size = problem.start.states.shape[-1]
     components = size * np.sum(kinds == FLIGHT) + (size + 1) * np.sum(kinds == IMPACT)
-    part, point = 1.0, problem.start
-    for _ in range(_ROUNDS):
-        found = fit(
+
+    def fitted(part: float, point: Point) -> Fit:
+        return fit(
             dataclasses.replace(problem, extras=allowing(problem.extras, part)),
             free=rig,
             start=point,
             iterations=policy.iterations,
             stop=given_up(problem.samples, policy),
         )
+
+    part = 1.0
+    found = fitted(part, problem.start)
+    for _ in range(_ROUNDS if components else 0):
         samples = np.nansum(found.costs.flown) + np.nansum(found.costs.rested)
-        ratio = np.sum(found.costs.joints) / max(components, 1)
+        ratio = np.sum(found.costs.joints) / components
         ratio = float(ratio / samples * problem.samples)
-        if not math.isfinite(ratio) or 1 / _CONSISTENT < ratio < _CONSISTENT:
+        fresh = min(max(part * math.sqrt(ratio), JOINT), 1 / JOINT**2)
+        near = 1 / _CONSISTENT < ratio < _CONSISTENT
+        if not math.isfinite(ratio) or near or fresh == part:
             break
-        part, point = part * math.sqrt(ratio), found.point
+        part, found = fresh, fitted(fresh, found.point)
     return found, part
 
 
-def _errors(found: Fit, policy: Policy) -> tuple[ModelError, ...]:
-    """Return the residuals of the channels, and the noise to be used for each."""
+def _residuals(found: Fit) -> dict[str, tuple[float, float]]:
+    """Return the noise and the rms residual of each channel."""
     squares: dict[str, list[np.ndarray]] = {}
     for one in residuals(found):
         squares.setdefault(one.channel, []).append(one.value**2)
-    errors = []
-    for name, sensor in found.problem.model.sensors.items():
-        if name not in squares:
-            continue
-        residual = math.sqrt(np.mean(np.concatenate(squares[name])))
-        stated = float(sensor.floor)
-        used = max(stated, policy.resolved * residual)
-        errors.append(ModelError(name, stated, residual, used))
-    return tuple(errors)
+    return {
+        name: (
+            float(found.problem.model.sensors[name].floor),
+            math.sqrt(np.mean(np.concatenate(parts))),
+        )
+        for name, parts in squares.items()
+    }

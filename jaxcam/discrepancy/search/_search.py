@@ -50,10 +50,16 @@ class Search:
             if not self._leads(before, best):
                 break
         if self.trials.settled(best):
-            return self._swapped(self._smallest(best))
+            return self.refined(best)
         if best.fit.cost < self.policy.explains * bare.fit.cost:
             return best
         return self._sound(bare)
+
+    def refined(self, best: Trial) -> Trial:
+        """Return the best subset without terms that are not needed, and after exchanges
+        of single terms.
+        """
+        return self._swapped(self._smallest(best))
 
     def _sound(self, bare: Trial) -> Trial:
         """Return the best of the subsets whose quadratic models are valid.
