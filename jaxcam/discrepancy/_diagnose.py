@@ -114,7 +114,7 @@ def diagnose(
         return asked(recordings, None if keep is None else keep / name, location)
 
     found = asked(recordings, keep)
-    odd = odd_record(found)
+    odd = odd_record(found.after, policy)
     if odd is not None:
         report(f"repeating the diagnosis without {odd}", None)
         others = [run for run in recordings if _name_of(run) != odd]
@@ -181,7 +181,9 @@ def _answered(
     search = Search(trials)
     best = search.run()
     bare, rough = trials.known[frozenset()], None
-    if far_from_data(bare.fit, best.fit, policy):
+    far = far_from_data(bare.fit, best.fit, policy)
+    # an odd recording is no error of the model
+    if far and odd_record(best.fit, policy) is None:
         rough = _roughly(question, bare, seed, report, keep, policy, clock)
     if rough is not None and not rough.choice.explained(policy):
         return diagnosis_of(case, *rough, ripple)

@@ -9,18 +9,19 @@ import dataclasses
 import numpy as np
 
 from ..fitting import Fit
+from .policy import Policy
 from .report import Caveat, Diagnosis, Reason
 
 
-def odd_record(found: Diagnosis) -> str | None:
-    """Return the name of the only recording that a diagnosis leaves unexplained, if
-    there is one.
+def odd_record(found: Fit, policy: Policy) -> str | None:
+    """Return the name of the only recording that a fit leaves unexplained, if there is
+    one.
 
     There must be at least `policy.records_apart` recordings. The cost per sample of the
     unexplained recording must be at least `policy.near`, and at least `policy.odd`
     times that of every other recording.
     """
-    policy, costs = found.policy, cost_by_record(found.after)
+    costs = cost_by_record(found)
     if len(costs) < policy.records_apart:
         return None
     worst, second = sorted(costs.values(), reverse=True)[:2]
