@@ -153,6 +153,7 @@ class _Found:
     summary: str = "An effect is missing."
     location: tuple[str, str] | None = None
     differing: None = None
+    noise_floor: float = 1e-4
 
     @property
     def after(self):

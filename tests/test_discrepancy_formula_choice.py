@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.search import _formulas
+from jaxcam.discrepancy.search import _formulas, Clock
 
 
 class _Fit(NamedTuple):
@@ -63,7 +63,9 @@ def chosen(monkeypatch, unchecked_types):
         monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
         monkeypatch.setattr(_formulas, "_fitted", fitted)
         fits = types.SimpleNamespace(policy=Policy())
-        found, _ = _formulas.formulated(fits, curve, None, small, lambda *_: None)
+        found, _ = _formulas.formulated(
+            fits, curve, None, small, lambda *_: None, Clock(1.0)
+        )
         return found.score, tried
 
     return choose

@@ -278,3 +278,21 @@ def test_an_element_written_in_the_form_of_bouc_and_wen():
         expected = v - gamma * abs(v) * z - delta * v * abs(z)
         found = element.rate(0.0, jnp.asarray(v), jnp.asarray([z]))
         assert float(found[0]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_transfer_of_a_resonance_is_that_of_its_equation():
+    """(a + b s) / (s^2 + 2 D w s + w^2) + k + c s, with strict types, to rounding."""
+    one = Resonator(
+        frequency=3.0,
+        ratio=0.1,
+        by_state=2.0,
+        by_rate=0.3,
+        stiffness=5.0,
+        damping=0.2,
+        middle=0.0,
+    )
+    frequency = np.array([0.5, 2.9, 8.0])
+    s, w = 2j * np.pi * frequency, 2 * np.pi * 3.0
+    expected = (2.0 + 0.3 * s) / (s**2 + 0.2 * w * s + w**2) + 5.0 + 0.2 * s
+    found = jax.vmap(one.transfer)(jnp.asarray(frequency))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -125,6 +125,8 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_ROUNDING",
         # above which the derivatives of a piece diverge
         "_DIVERGED",
+        # how complete flights are approached
+        "_PARTS",
         # when joints that allow for model errors are consistent with the samples
         "_CONSISTENT",
         # how Newton steps for states of held-out data are shortened

@@ -247,6 +247,6 @@ def test_a_search_whose_time_is_over_says_so():
         candidates=[Sail()],
         policy=Policy(minutes=1e-9),
     )
-    assert found.verdict is Verdict.UNKNOWN and not found.names
+    assert found.verdict is Verdict.UNKNOWN and found.names == ("unknown",)
     assert Reason.TIME in {caveat.reason for caveat in found.caveats}
     assert found.left_before

@@ -8,6 +8,7 @@ import abc
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -121,11 +122,14 @@ class Resonator(HiddenElement):
 
     def transfer(self, frequency):
         """Return the complex ratio of force to deflection at given frequencies (Hz)."""
-        s = 2j * jnp.pi * frequency
-        w = 2 * jnp.pi * self.frequency
-        below = s**2 + 2 * self.ratio * w * s + w**2
-        above = self.by_state + self.by_rate * s
-        return above / below + self.stiffness + self.damping * s
+        driven, w = 2 * jnp.pi * frequency, 2 * jnp.pi * self.frequency
+        below = _complex(w**2 - driven**2, 2 * self.ratio * w * driven)
+        above = _complex(self.by_state, self.by_rate * driven)
+        return above / below + _complex(self.stiffness, self.damping * driven)
+
+
+def _complex(real, imaginary):
+    return jax.lax.complex(*jnp.broadcast_arrays(real, imaginary))
 
 
 class Relaxation(HiddenElement):
