@@ -182,8 +182,9 @@ def _answered(
     best = search.run()
     bare, rough = trials.known[frozenset()], None
     far = far_from_data(bare.fit, best.fit, policy)
-    # an odd recording is no error of the model
-    if far and odd_record(best.fit, policy) is None:
+    # an odd recording is no missing physics: the diagnosis is repeated without it
+    odd = odd_record(best.fit, policy) is not None
+    if far and not odd:
         rough = _roughly(question, bare, seed, report, keep, policy, clock)
     if rough is not None and not rough.choice.explained(policy):
         return diagnosis_of(case, *rough, ripple)
@@ -192,7 +193,7 @@ def _answered(
         again = _again(trials, rough.choice.best)
         if again is not None and again.bic < best.bic:
             best = search.refined(again)
-    choice = choose(question, trials, best, seed)
+    choice = choose(question, trials, best, seed, unnamed=not odd)
     if rough is not None and rough.finds and not choice.explained(policy):
         return diagnosis_of(case, *rough, ripple)
     return diagnosis_of(case, question, trials, choice, ripple)

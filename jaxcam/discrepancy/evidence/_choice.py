@@ -89,11 +89,14 @@ class Choice:
         return found.cost < policy.as_noise**2 * found.problem.samples
 
 
-def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choice:
+def choose(
+    question: Question, trials: Trials, found: Trial, seed: int, unnamed: bool = True
+) -> Choice:
     """Drop terms that only a few blocks of the recordings support, and test the
     residuals of the remaining terms.
 
-    **Arguments:** the question, its fits, the best subset of terms, and the seed.
+    **Arguments:** the question, its fits, the best subset of terms, the seed, and
+    whether unnamed functions are sought.
 
     A doubtful term is named if no structure remains with it but much remains without
     it, provided that it improves the prediction of held-out data.
@@ -128,7 +131,7 @@ def choose(question: Question, trials: Trials, found: Trial, seed: int) -> Choic
         # the named terms may only imitate differences between the recordings
         without = differing(before.fit, trials.policy)
         settled |= _settled(without, left_before, best.bic, trials.policy)
-    if left and trials.policy.functions and not settled:
+    if left and unnamed and trials.policy.functions and not settled:
         missing, needed_parts, others = without_a_name(
             question, trials, best, left, seed
         )
