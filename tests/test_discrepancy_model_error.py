@@ -3,12 +3,11 @@
 import dataclasses
 import math
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from swing_rig import PARAMETERS, Swing
 
-from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
 from jaxcam.discrepancy._diagnose import _again
 from jaxcam.discrepancy.report import Reason
@@ -20,36 +19,13 @@ from jaxcam.discrepancy.search import (
     with_model_error,
 )
 from jaxcam.discrepancy.search._blocks import _diverging, blocks_of
-from jaxcam.fitting import fit, Parameter, Sensor
+from jaxcam.fitting import fit, Sensor
 from jaxcam.fitting.engine import allowing, JOINT, separated
 from jaxcam.recordings import Recording, segment
 
 
 _TIME = 5e-3 * np.arange(1600)
 _NOISE = 1e-7
-
-
-class Swing(HybridSystem):
-    """A damped mass on a spring, far from any stop."""
-
-    stiffness: float = 149.0
-    damping: float = 0.1
-
-    def vector_field(self, t, state):
-        force = self.stiffness * state[0] + self.damping * state[1]
-        return jnp.stack([state[1], -force])
-
-    def gap(self, t, state):
-        return state[0] + 100.0
-
-    def impact(self, t, state):
-        return state
-
-
-_PARAMETERS = (
-    Parameter("stiffness", lambda m: m.system.stiffness, 3.0, unit="1/s^2"),
-    Parameter("damping", lambda m: m.system.damping, 0.05, unit="1/s"),
-)
 
 
 def _segments(force, noise=_NOISE):
@@ -90,7 +66,7 @@ def _question(parts, noise=_NOISE):
         tuple(parts),
         _terms("nonlinear_spring"),
         {"angle_rad": Sensor(0, noise=noise)},
-        _PARAMETERS,
+        PARAMETERS,
         None,
         _silent,
         Policy(),
@@ -115,6 +91,10 @@ def test_joints_that_allow_for_errors_keep_their_proportions(question):
         np.testing.assert_allclose(apart.impact, max(part, 1.0) / JOINT * one.impact)
         again = allowing(found, JOINT).sharpness
         np.testing.assert_allclose(again.impact, max(part, 1.0) * one.impact)
+        # complete flights are as tight as before, whatever was allowed
+        tight = allowing(found, JOINT / max(part, 1.0)).sharpness
+        np.testing.assert_allclose(tight.flight, JOINT * one.piece)
+        np.testing.assert_allclose(tight.impact, one.impact)
     np.testing.assert_allclose(
         separated(given).sharpness.gap, allowing(given, 1.0).sharpness.gap
     )
@@ -122,7 +102,8 @@ def test_joints_that_allow_for_errors_keep_their_proportions(question):
 
 def test_noise_and_joints_are_as_large_as_the_errors(question):
     """The noise is `resolved` times the residual, and a component of a joint costs as
-    much as a sample, within a factor of two."""
+    much as a sample, within a factor of three: the fit of a problem with larger noise
+    is another one."""
     policy = Policy()
     bare = fit(question.problem, free=question.rig)
     assert far_from_data(bare, bare, policy)
@@ -175,7 +156,8 @@ def test_flights_of_one_piece_have_no_joints_to_loosen():
     short = _question(parts)
     assert not np.any(np.asarray(short.problem.pieces.joint))
     found = with_model_error(short, Policy())
-    assert found is None or found.model_errors[0].used >= _NOISE
+    assert found is not None and found.looseness == 1.0
+    assert found.model_errors[0].residual > 10 * _NOISE
 
 
 def test_errors_that_single_pieces_do_not_show_are_not_allowed_for():
@@ -217,7 +199,7 @@ def test_physics_that_is_found_is_fitted_with_the_stated_noise():
         _segments(lambda x, v: -0.05 * abs(v) * v),
         _terms("quadratic_drag", "nonlinear_spring"),
         sensors={"angle_rad": Sensor(0, noise=_NOISE)},
-        parameters=list(_PARAMETERS),
+        parameters=list(PARAMETERS),
     )
     assert found.verdict is Verdict.EFFECT and found.names == ("quadratic_drag",)
     assert found.heldout_before > 100 * _NOISE
@@ -233,7 +215,7 @@ def test_a_model_that_stays_far_off_says_so():
         _segments(_bumps),
         _terms("nonlinear_spring"),
         sensors={"angle_rad": Sensor(0, noise=_NOISE)},
-        parameters=list(_PARAMETERS),
+        parameters=list(PARAMETERS),
         policy=dataclasses.replace(Policy(), functions=0),
     )
     assert found.verdict is Verdict.UNKNOWN

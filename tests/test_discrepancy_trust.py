@@ -6,8 +6,8 @@ from typing import ClassVar
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from swing_rig import PARAMETERS, Swing
 
-from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, Policy, strength, Term, Verdict
 from jaxcam.discrepancy.evidence import shares, VisitedStates
 from jaxcam.discrepancy.report import Reason
@@ -20,29 +20,6 @@ from jaxcam.recordings.cut import least_noise, measured_noise
 _NOISE = 1e-4
 _STIFFNESS = 150.0
 _TIME = 1e-3 * np.arange(2500)
-
-
-class DampedSwing(HybridSystem):
-    """A damped mass on a spring, far from any stop."""
-
-    stiffness: float = 149.0
-    damping: float = 0.1
-
-    def vector_field(self, t, state):
-        force = self.stiffness * state[0] + self.damping * state[1]
-        return jnp.stack([state[1], -force])
-
-    def gap(self, t, state):
-        return state[0] + 100.0
-
-    def impact(self, t, state):
-        return state * jnp.array([1.0, -0.5])
-
-
-_PARAMETERS = (
-    Parameter("stiffness", lambda m: m.system.stiffness, 3.0, unit="1/s^2"),
-    Parameter("damping", lambda m: m.system.damping, 0.05, unit="1/s"),
-)
 
 
 class SharpFriction(Term):
@@ -95,10 +72,10 @@ def _diagnosed(motions, *, noise=_NOISE, stated=_NOISE, seed=1, **options):
         for k, x in enumerate(motions)
     ]
     return diagnose(
-        DampedSwing(),
+        Swing(),
         [segment(run, "angle_rad", noise=stated) for run in runs],
         sensors={"angle_rad": Sensor(0, noise=stated)},
-        parameters=list(_PARAMETERS),
+        parameters=list(PARAMETERS),
         **options,
     )
 
@@ -173,10 +150,10 @@ def test_a_parameter_beyond_its_tolerance_that_nothing_acts_like_is_said():
         for k, x in enumerate([_free(0.3, 0.1), _free(0.2, 0.1)])
     ]
     found = diagnose(
-        DampedSwing(),
+        Swing(),
         [segment(run, "angle_rad", noise=_NOISE) for run in runs],
         sensors={"angle_rad": Sensor(0, noise=_NOISE)},
-        parameters=[soft, _PARAMETERS[1]],
+        parameters=[soft, PARAMETERS[1]],
         candidates=(Sail(),),
     )
     assert found.verdict is Verdict.NONE
@@ -224,11 +201,11 @@ def test_the_extended_library_is_chosen_by_a_word():
         {
             term.name
             for term in system_question(
-                DampedSwing(),
+                Swing(),
                 parts,
                 candidates,
                 {"angle_rad": Sensor(0, noise=_NOISE)},
-                _PARAMETERS,
+                PARAMETERS,
                 None,
                 lambda *_: None,
                 Policy(),

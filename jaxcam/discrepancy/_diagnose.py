@@ -244,7 +244,7 @@ def _roughly(
     trials = _trials(rough, report, folder, policy, clock)
     choice = choose(rough, trials, Search(trials).run(), seed)
     report("fitting complete flights", None)
-    whole = whole_flights(bare.fit, choice.fit, policy)
+    whole = whole_flights(bare.fit, choice.fit, rough.looseness, policy)
     return _Roughly(rough, trials, dataclasses.replace(choice, whole=whole))
 
 

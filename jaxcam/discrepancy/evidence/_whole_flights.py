@@ -25,19 +25,22 @@ class WholeFlights(NamedTuple):
     after: float
 
 
-def whole_flights(before: Fit, after: Fit, policy: Policy) -> WholeFlights:
+def whole_flights(
+    before: Fit, after: Fit, looseness: float, policy: Policy
+) -> WholeFlights:
     """Fit the chosen model to complete flights, starting from its fit to single pieces.
 
     **Arguments:** the fit of the textbook model to complete flights; the fit of the
-    chosen model, in which the pieces may join inexactly; the policy.
+    chosen model, in which the pieces may join inexactly; the error of its joints
+    relative to that of a single piece; the policy.
     """
     found = after
     for part in _PARTS:
-        # all joints at once would start too far from the data
+        # all joints at once would start too far from the data; the scale of looser
+        # joints than those of separate pieces is that of the joints themselves
+        tight = allowing(after.problem.extras, part / max(looseness, 1.0))
         found = fit(
-            dataclasses.replace(
-                after.problem, extras=allowing(after.problem.extras, part)
-            ),
+            dataclasses.replace(after.problem, extras=tight),
             free=after.free,
             start=found.point,
             iterations=policy.quick_iterations,

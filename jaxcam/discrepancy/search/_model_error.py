@@ -71,7 +71,9 @@ def with_model_error(question: Question, policy: Policy) -> Question | None:
         [one for one in found.problem.parameters if one.known is None],
     )
     problem = dataclasses.replace(problem, extras=allowing(problem.extras, part))
-    return dataclasses.replace(question, problem=problem, model_errors=errors)
+    return dataclasses.replace(
+        question, problem=problem, model_errors=errors, looseness=part
+    )
 
 
 def _loosely_joined(

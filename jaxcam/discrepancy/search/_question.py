@@ -44,6 +44,8 @@ class Question:
     - `noisier`: channels with more noise than stated.
     - `model_errors`: residuals of the channels, if the model is so far from the data
         that its errors are allowed for.
+    - `looseness`: in that case, error of a joint relative to that of the state of a
+        single piece.
     - `location`: coordinate and gap on which missing physics acts.
     """
 
@@ -60,6 +62,7 @@ class Question:
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
     noisier: tuple["Noisier", ...] = ()
     model_errors: tuple["ModelError", ...] = ()
+    looseness: float = 1.0
     location: Location = Location()
 
 
