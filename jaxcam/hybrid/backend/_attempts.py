@@ -76,7 +76,9 @@ def traced(key: Key) -> Program:
         parts = key.own.tree(own), key.shared.tree(shared)
         system, plan = eqx.combine(*parts, static)
         lane = jax.tree.unflatten(key.lane, scalars)
-        functions = Functions(system, len(lane.x), plan.plain, shared=True)
+        functions = Functions(
+            system, len(lane.x), plan.plain, shared=True, branches=True
+        )
         after, record = key.step(functions, plan, lane)
         place, values = key.row(record, after)
         return [jnp.asarray(v) for v in (*jax.tree.leaves(after), place, *values)]

@@ -1,10 +1,11 @@
 """Branches and loops inside a program, for batch elements that take different paths.
 
-All sides of a branch are computed and one is selected; a loop continues until it has
-ended for all elements. In a side that is active for only some batch elements, loops do
-not wait for the others.
+Each side of a branch that at least one element of the vector takes is computed, and one
+of them is selected; a loop continues until it has ended for all elements. In a side
+that is active for only some batch elements, loops do not wait for the others.
 """
 
+import functools
 from collections.abc import Callable
 from typing import no_type_check
 
@@ -16,6 +17,8 @@ from ._arrays import value_of
 from ._writer import INT64, kind_of, Lacking, Writer
 
 
+# maximum number of operations of a side of a branch that is not skipped
+_SHORT = 24
 # maximum number of operations of an unrolled loop
 _UNROLLED = 6000
 # maximum number of values that a table of a loop may store on the stack
@@ -23,8 +26,11 @@ _KEPT = 16384
 
 
 @no_type_check
-def branches(w: Writer, program: Callable, equation, inputs):
-    """Emit all sides of a branch, and select one of them by an index."""
+def branches(w: Writer, program: Callable, size: Callable, equation, inputs):
+    """Emit the sides of a branch, and select one of them by an index.
+
+    A side that no element of the vector takes is skipped, unless it is short.
+    """
     which, *arguments = inputs
     sides = equation.params["branches"]
     dtype = equation.invars[0].aval.dtype
@@ -35,9 +41,29 @@ def branches(w: Writer, program: Callable, equation, inputs):
     for k, side in enumerate(sides):
         here = _is_side(w, index, k, len(sides), dtype)
         w.mask = w.both(outer, here)
-        results = program(side.jaxpr, side.consts, arguments)
+        skipped = size(side.jaxpr) > _SHORT
+        emit = functools.partial(program, side.jaxpr, side.consts, arguments)
+        results = _where_taken(w, emit, side.out_avals) if skipped else emit()
         made = results if made is None else _chosen(w, side, here, results, made)
     w.mask = outer
+    return made
+
+
+@no_type_check
+def _where_taken(w: Writer, emit: Callable, avals):
+    """Emit instructions that are skipped if the mask contains no element."""
+    b, before = w.builder, w.builder.block
+    inside, after = b.append_basic_block("side"), b.append_basic_block("after")
+    b.cbranch(w.any(w.mask), inside, after)
+    b.position_at_end(inside)
+    carried = _Carried(w, avals)
+    flat = carried.flat(emit())
+    end = b.block
+    b.branch(after)
+    b.position_at_end(after)
+    unused = [ir.Constant(value.type, ir.Undefined) for value in flat]
+    made = carried.enter(unused, before)
+    carried.add(flat, end)
     return made
 
 
@@ -67,12 +93,11 @@ def _chosen(w: Writer, side, here, results, others):
 
 
 class _Carried:
-    """The values that a loop carries from round to round, as vectors."""
+    """The values that pass from one block of instructions to another, as vectors."""
 
-    def __init__(self, w: Writer, avals, start):
+    def __init__(self, w: Writer, avals):
         self.w, self.avals = w, avals
         self.shapes = [aval.shape for aval in avals]
-        self.first = self.flat(start)
         self.nodes: list = []
 
     def flat(self, arrays) -> list:
@@ -83,9 +108,12 @@ class _Carried:
             for element in array.ravel()
         ]
 
-    def enter(self, before) -> list:
-        """Create the values at the head of the loop, and return them as arrays."""
-        for value in self.first:
+    def enter(self, flat, before) -> list:
+        """Create the values at the head of a block, and return them as arrays.
+
+        **Arguments:** the values with which the block is entered from `before`.
+        """
+        for value in flat:
             node = self.w.builder.phi(value.type)
             node.add_incoming(value, before)
             self.nodes.append(node)
@@ -101,7 +129,8 @@ class _Carried:
             left = left[size:]
         return out
 
-    def back(self, flat, block) -> None:
+    def add(self, flat, block) -> None:
+        """Add the values with which the block is entered from another one."""
         for node, value in zip(self.nodes, flat, strict=True):
             node.add_incoming(value, block)
 
@@ -113,12 +142,13 @@ def while_loop(w: Writer, program: Callable, equation, inputs):
     first, second = params["cond_nconsts"], params["body_nconsts"]
     of_test, of_body = inputs[:first], inputs[first : first + second]
     test, body = params["cond_jaxpr"], params["body_jaxpr"]
-    carried = _Carried(w, body.out_avals, inputs[first + second :])
+    carried = _Carried(w, body.out_avals)
+    begun = carried.flat(inputs[first + second :])
     before, head = b.block, b.append_basic_block("while")
     inside, after = b.append_basic_block("round"), b.append_basic_block("after")
     b.branch(head)
     b.position_at_end(head)
-    state = carried.enter(before)
+    state = carried.enter(begun, before)
     (goes,) = program(test.jaxpr, test.consts, [*of_test, *state])
     goes = w.both(w.mask, w.spread(value_of(w, goes[()], np.dtype(bool))))
     b.cbranch(w.any(goes), inside, after)
@@ -128,7 +158,7 @@ def while_loop(w: Writer, program: Callable, equation, inputs):
     w.mask = outer
     pairs = zip(carried.flat(new), carried.nodes, strict=True)
     chosen = [w.choose(goes, value, old) for value, old in pairs]
-    carried.back(chosen, b.block)
+    carried.add(chosen, b.block)
     b.branch(head)
     b.position_at_end(after)
     return state
@@ -181,13 +211,14 @@ def _rolled(w: Writer, program: Callable, body, parts, length: int, reverse: boo
         _Table(w, aval.dtype, None, (length, *aval.shape))
         for aval in body.out_avals[number:]
     ]
-    carried = _Carried(w, body.out_avals[:number], start)
+    carried = _Carried(w, body.out_avals[:number])
+    begun = carried.flat(start)
     before, head = b.block, b.append_basic_block("scan")
     b.branch(head)
     b.position_at_end(head)
     count = b.phi(INT64)
     count.add_incoming(ir.Constant(INT64, 0), before)
-    state = carried.enter(before)
+    state = carried.enter(begun, before)
     last = ir.Constant(INT64, length - 1)
     k = b.sub(last, count) if reverse else count
     results = program(
@@ -199,7 +230,7 @@ def _rolled(w: Writer, program: Callable, body, parts, length: int, reverse: boo
     more = b.add(count, ir.Constant(INT64, 1))
     here, after = b.block, b.append_basic_block("after")
     count.add_incoming(more, here)
-    carried.back(flat, here)
+    carried.add(flat, here)
     b.cbranch(b.icmp_signed("<", count, last), head, after)
     b.position_at_end(after)
     return [*carried.arrays(flat), *(t.all() for t in made)]

@@ -64,7 +64,7 @@ class Emitter:
             rows = np.moveaxis(inputs[0], params["axis"], 0)
             return [rows[k, ...] for k in range(len(rows))]
         if name == "cond":
-            return branches(self.w, self.program, equation, inputs)
+            return branches(self.w, self.program, operations, equation, inputs)
         if name == "while":
             return while_loop(self.w, self.program, equation, inputs)
         if name == "scan":

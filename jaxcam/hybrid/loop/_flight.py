@@ -2,6 +2,7 @@
 impact.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from ._gap_polynomial import (
     power_coefficients,
     time_to_root,
 )
+from ._select import everywhere
 
 
 # an impact within this fraction of the step from its end is computed by the Taylor
@@ -44,7 +46,16 @@ class StepVerdict(NamedTuple):
 
 
 def judge(
-    left: Jet, right: Jet, h, slack, rounding, scale, room, longest, calm: bool = False
+    left: Jet,
+    right: Jet,
+    h,
+    slack,
+    rounding,
+    scale,
+    room,
+    longest,
+    calm: bool = False,
+    where: Callable = everywhere,
 ) -> StepVerdict:
     """Check the step of one free constraint for events.
 
@@ -53,7 +64,8 @@ def judge(
     far, the time left to the next requested time (an impact beyond it waits for a later
     step), and the longest step that the error allows. If `calm`, at a Poincaré section,
     a motion may stay at a distance that is tolerated; otherwise, rounding would make a
-    motion at rest on the section cross it endlessly.
+    motion at rest on the section cross it endlessly. `where` selects the results of
+    parts that are rarely needed.
     """
     polynomial = bernstein(left, right, h)
     inward = moves_in(right, rounding)
@@ -81,10 +93,13 @@ def judge(
     dips = (lowest(polynomial) < -slack) & ~behind & ~now & ~leaves
     lands = ((inward & near) | now) & ~dips & ~vague
     retake = (behind & ~lands) | dips | vague
-    c = power_coefficients(left, right, h)
-    fraction = jnp.where(behind, crossing(c), lowest_point(polynomial, c))
-    fraction = jnp.where(vague, 0.5, fraction)
-    length = jnp.where(retake, fraction * h, jnp.inf)
+
+    def shorter():
+        c = power_coefficients(left, right, h)
+        fraction = jnp.where(behind, crossing(c), lowest_point(polynomial, c))
+        return jnp.where(vague, 0.5, fraction) * h
+
+    length = where(retake, shorter, jnp.inf)
     return StepVerdict(retake, length, lands, offset, jnp.zeros_like(h))
 
 

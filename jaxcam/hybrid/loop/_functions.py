@@ -1,6 +1,8 @@
 """The functions of a system that one iteration of the loop evaluates, as scalars."""
 
 import contextlib
+from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -13,6 +15,7 @@ from ..runge_kutta import rates_among
 from ._frame import Frame
 from ._gap_polynomial import Jet
 from ._programs import programs_of
+from ._select import everywhere, where_needed
 
 
 class Functions:
@@ -28,16 +31,26 @@ class Functions:
     `plain` functions are called unchanged, with arrays. `shared` programs are traced
     once for all runs of this kind of system. Only runs that are not traced may use
     them: each trace by a user must see what has changed since the last one.
+
+    If the compiled program may have `branches`, parts that no batch element needs are
+    skipped; otherwise, all parts are computed for all batch elements.
     """
 
     def __init__(
-        self, system: HybridSystem, n: int, plain: bool = False, *, shared: bool = False
+        self,
+        system: HybridSystem,
+        n: int,
+        plain: bool = False,
+        *,
+        shared: bool = False,
+        branches: bool = False,
     ):
         parameters, static = eqx.partition(system, eqx.is_inexact_array)
         found = programs_of(static, parameters, n, plain=plain, shared=shared)
         self._program = found.by_name
         self.n, self.m, self.k = n, found.m, found.k
         self.plain, self.planar = plain, found.planar
+        self._branches = branches
         # surfaces on which a motion can slide
         self.slidable = found.slidable
         # whether contacts have friction; whether impacts may coincide
@@ -55,13 +68,27 @@ class Functions:
     def sharing(self):
         """Compute equal expressions of the same scalars only once within this block.
 
-        All calls in the block must belong to one trace (no loop or branch inside).
+        All calls in the block must belong to one trace: no loop inside, and no branches
+        other than those of `where`.
         """
         self._memory = Memory()
         try:
             yield
         finally:
             self._memory = None
+
+    def where(self, condition, compute: Callable, otherwise) -> Any:
+        """Return the result of `compute` where the condition holds, `otherwise`
+        elsewhere.
+        """
+        if not self._branches:
+            return everywhere(condition, compute, otherwise)
+        # values of a branch do not exist outside it
+        outside, self._memory = self._memory, Memory()
+        try:
+            return where_needed(condition, compute, otherwise)
+        finally:
+            self._memory = outside
 
     def _side(self, mode) -> tuple:
         """Return a tuple with the mode, empty if there are no surfaces."""

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from ._functions import Functions
 from ._loop_state import LoopState
-from ._select import any_of, select
+from ._select import any_of
 
 
 class Hits(NamedTuple):
@@ -55,5 +55,9 @@ def hits_together(
     if functions.rubs:
         joins = strikes & any_of([closed[k] & ~hit[k] for k in range(m)])
         closed = [joins & one for one in closed]
-    joint = functions.impacts_together(t, x, closed, carried.mode)
-    return Hits(several, joins, select(joins, joint, after), all_hit)
+    after = functions.where(
+        joins,
+        lambda: functions.impacts_together(t, x, closed, carried.mode),
+        tuple(after),
+    )
+    return Hits(several, joins, after, all_hit)

@@ -88,7 +88,7 @@ def _iterate(
     # in contact, the state is moved onto the surface again; its change must be small
     settled = functions.onto(made.frame, landing.jets, landing.x, landing.mode)
     converged = ~sticking | settles(functions, carried, made, landing, settled)
-    held = _judge_contacts(carried, end, landing, judged)
+    held = _judge_contacts(functions, carried, end, landing, judged)
     jam = jam_of_step(functions, plan, carried, end, made)
     reached = held.lands & judged.good & ~lands & converged & ~jam.near
     locates = reached & ~carried.locating & plan.exact_release
@@ -207,6 +207,7 @@ def _judge_flights(
                 end.room,
                 carried.longest,
                 calm=functions.counts is not None and k + 1 == len(jets),
+                where=functions.where,
             ),
         )
         for k, jet in enumerate(jets)
@@ -235,29 +236,28 @@ def _judge_flights(
 
 
 def _judge_contacts(
-    carried: LoopState, end: StepEnd, landing: Landing, judged: Judged
+    functions: Functions,
+    carried: LoopState,
+    end: StepEnd,
+    landing: Landing,
+    judged: Judged,
 ) -> StepVerdict:
     """Detect releases at the closed gaps."""
+    h, no = end.length, jnp.asarray(False)
+    none = StepVerdict(no, jnp.full_like(h, jnp.inf), no, 0.0 * h, 0.0 * h)
+    flags = carried.completing, carried.locating
+
+    def verdict(k: int, tiny) -> StepVerdict:
+        jets, limits = (carried.jets[k], landing.jets[k]), (judged.natural, tiny)
+        found = judge_contact(*jets, h, *limits, end.room, *flags)
+        return _where_in_force(carried.contact[k], found)
+
     if not carried.held:
-        h, no = end.length, jnp.asarray(False)
-        return StepVerdict(no, jnp.full_like(h, jnp.inf), no, 0.0 * h, 0.0 * h)
-    return earliest(
-        [
-            _where_in_force(
-                carried.contact[k],
-                judge_contact(
-                    carried.jets[k],
-                    jet,
-                    end.length,
-                    judged.natural,
-                    judged.tiny[k],
-                    end.room,
-                    carried.completing,
-                    carried.locating,
-                ),
-            )
-            for k, jet in enumerate(landing.jets[: len(carried.held)])
-        ]
+        return none
+    return functions.where(
+        any_of(carried.contact),
+        lambda: earliest([verdict(k, tiny) for k, tiny in enumerate(judged.tiny)]),
+        none,
     )
 
 

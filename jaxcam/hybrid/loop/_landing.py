@@ -10,7 +10,7 @@ from ._flight import StepVerdict
 from ._functions import Functions
 from ._hits_together import hits_together
 from ._loop_state import LoopState
-from ._rest_of_chatter import Impact, no_rest, Rest, rest_of_chatter
+from ._rest_of_chatter import Impact, may_rest, no_rest, Rest, rest_of_chatter
 from ._rest_together import loses_energy, rest_together
 from ._select import any_of, largest, of_constraint, select
 from ._series import taylor
@@ -98,7 +98,7 @@ def land(
     if functions.k:
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
         mode = mode + sides.negative + sides.sliding
-        jets = functions.jets(seen, x, mode)
+        jets = _jets_after(functions, carried, made, lands, seen, x, mode)
         passed = past_surfaces(
             functions, carried, jets, hit, sides, approach, rounding, stops
         )
@@ -110,7 +110,7 @@ def land(
             moved, _ = functions.settled(seen, x, mode)
             x = select(passed.passed_over, moved, x)
     else:
-        jets = functions.jets(seen, x, mode)
+        jets = _jets_after(functions, carried, made, lands, seen, x, mode)
 
     # decide whether the remaining impacts can be completed by a formula
     rebound = jnp.maximum(
@@ -146,6 +146,14 @@ def land(
     )
 
 
+def _jets_after(functions, carried, made, lands, t, x, mode):
+    """Return the jets at a state in a mode. Without an event or a contact, they are
+    those at the end of the step.
+    """
+    changed = lands | any_of([*carried.closed, *(s > 0 for s in carried.stale)])
+    return functions.where(changed, lambda: functions.jets(t, x, mode), made.jets)
+
+
 class _Ending(NamedTuple):
     """Whether and how the impacts after this one are completed: see `Landing`."""
 
@@ -161,15 +169,20 @@ def _ending(
     """Complete the impacts that follow this one, on its constraint or on several."""
     if not functions.m:
         return _Ending(no_rest(impact), jnp.asarray(False), [], [])
-    chatter = rest_of_chatter(
-        functions, plan, impact, speeds, jets, mode, end.stop, rounding
-    )
     # the sequence must be advanced enough, or the rebound so slow that rounding hides
     # the next flight, whose height v^2 / 2a is then below 250 times the rounding error
     deep = impact.rebound <= plan.depth * fastest
     low = 500 * of_constraint(carried.blur, impact.constraint)
     hides = impact.rebound * impact.rebound <= low * _pull(jets, impact)
-    begins = chatter.possible & (deep | hides)
+    ends = any_of(hit[: functions.m]) & (deep | hides)
+    chatter = functions.where(
+        ends & may_rest(plan, impact, jets),
+        lambda: rest_of_chatter(
+            functions, plan, impact, speeds, jets, mode, end.stop, rounding
+        ),
+        no_rest(impact),
+    )
+    begins = chatter.possible & ends
     closing = [begins & h for h in hit[: functions.m]]
     pulls = [chatter.acceleration] * functions.m
     if functions.m == 1:
@@ -198,16 +211,20 @@ def _kept_contacts(functions, carried, lands, joins, t, before, after):
     mode = carried.mode
     if functions.m <= 1:
         return carried.contact
-    speeds = functions.velocity(t, before, mode), functions.velocity(t, after, mode)
-    rounding = [functions.speed_blur(t, x, mode) for x in (before, after)]
-    changes = [jnp.abs(new - old) for old, new in zip(*speeds, strict=True)]
-    least = jnp.zeros(())
-    if functions.rubs:
-        least = jnp.where(joins, _JOINT * largest(changes), 0.0)
-    return tuple(
-        c & (~lands | (change <= jnp.maximum(500 * (a + b), least)))
-        for c, change, a, b in zip(carried.contact, changes, *rounding, strict=True)
-    )
+
+    def kept():
+        speeds = functions.velocity(t, before, mode), functions.velocity(t, after, mode)
+        rounding = [functions.speed_blur(t, x, mode) for x in (before, after)]
+        changes = [jnp.abs(new - old) for old, new in zip(*speeds, strict=True)]
+        least = jnp.zeros(())
+        if functions.rubs:
+            least = jnp.where(joins, _JOINT * largest(changes), 0.0)
+        return tuple(
+            c & (change <= jnp.maximum(500 * (a + b), least))
+            for c, change, a, b in zip(carried.contact, changes, *rounding, strict=True)
+        )
+
+    return functions.where(lands & any_of(carried.contact), kept, carried.contact)
 
 
 def _pull(jets, impact):

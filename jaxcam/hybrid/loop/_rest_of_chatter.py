@@ -38,6 +38,16 @@ class Impact(NamedTuple):
     joins: Any
 
 
+def may_rest(plan, impact: Impact, jets):
+    """Return whether the chatter after an impact may be completed, without knowledge of
+    the coefficient of restitution, which is above -1.
+    """
+    a = of_constraint([j.acceleration for j in jets], impact.constraint)
+    j = of_constraint([j.jerk for j in jets], impact.constraint)
+    small = impact.rebound * jnp.abs(j) <= 2 * plan.smallness * a * a
+    return (a < 0) & small & ~impact.several
+
+
 def rest_of_chatter(
     functions, plan, impact: Impact, speeds, jets, mode, stop, rounding
 ) -> Rest:

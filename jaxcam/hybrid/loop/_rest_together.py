@@ -41,9 +41,13 @@ def rest_together(
     near = [~mode[k] & _ends(jets[k], strongest, *small, rounding[k]) for k in range(m)]
     closing = [hit[k] | near[k] for k in range(m)]
     touching = tuple(closing[k] | mode[k] for k in range(m))
-    state, multipliers = functions.joint_rest(impact.t, impact.after, touching, mode)
     several = sum(jnp.where(closes, 1.0, 0.0) for closes in closing) > 1
     possible = any_of(hit[:m]) & loses_energy(impact) & several
+    state, multipliers = functions.where(
+        possible,
+        lambda: functions.joint_rest(impact.t, impact.after, touching, mode),
+        (impact.after, (0.0,) * m),
+    )
     for k in range(m):
         pull = -multipliers[k]
         possible = possible & (~touching[k] | (pull >= 0))
