@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -17,12 +18,14 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 import jaxcam as package
+from jaxcam import discrepancy
 from jaxcam.cli import app
 from jaxcam.cli._cache import keep_compiled_programs
 from jaxcam.cli._output import to_text
 from jaxcam.cli._parameters import assign_parameters, parameters
 from jaxcam.cli._source import make_system
 from jaxcam.data import DEMO_RIG, PENDULUM
+from jaxcam.recordings import RecordingError
 
 
 BALL = "simulate bouncing-ball --set restitution=0.5 --state 2,0 --t1 3".split()
@@ -349,3 +352,22 @@ def test_commands_on_the_page_of_the_demo_can_be_pasted(demonstration):
     for line in lines:
         name, *arguments = shlex.split(line)
         assert commands[name].make_context(name, arguments).params
+
+
+def test_a_verdict_is_kept_if_no_recording_can_be_recommended(tmp_path, monkeypatch):
+    """The sentence stands in the error, with exit code 2; the verdict is written."""
+
+    def fails(*arguments):
+        raise RecordingError("No flight occurs; give a higher speed.")
+
+    found = SimpleNamespace(to_json=lambda: {"verdict": "none"})
+    monkeypatch.setattr(discrepancy, "diagnose", lambda *words, **options: found)
+    # the package exports the command under the name of its module
+    module = sys.modules["jaxcam.cli._diagnose"]
+    monkeypatch.setattr(module, "_outlook", fails)
+    monkeypatch.setattr(module, "_print", lambda *words: None)
+    file = tmp_path / "verdict.json"
+    line = ["diagnose", "demo", "--next", f"--json={file}"]
+    said = CliRunner().invoke(app, line)
+    assert said.exit_code == 2 and "No flight occurs" in said.output
+    assert json.loads(file.read_text()) == {"verdict": "none"}

@@ -10,6 +10,7 @@ from swing_rig import PARAMETERS, Swing
 
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
 from jaxcam.discrepancy._diagnose import _again
+from jaxcam.discrepancy.evidence._visited_states import visited_states
 from jaxcam.discrepancy.report import Reason
 from jaxcam.discrepancy.search import (
     far_from_data,
@@ -181,6 +182,20 @@ def test_only_pieces_with_diverging_derivatives_are_left_out(question):
         assert found[0, 3] and np.sum(found) == 1
     blocks = blocks_of(problem, problem.start, 2)
     assert np.all(np.abs(blocks.information).max((1, 2)) > 0)
+
+
+def test_recordings_may_begin_at_any_time(question):
+    """Sections and ranges of the time follow the recordings: the same information."""
+    parts = []
+    for part in question.problem.segments:
+        run = part.recording
+        late = Recording(run.name, run.time + 100.0, dict(run.channels))
+        parts.append(segment(late, "angle_rad", noise=_NOISE))
+    late = _question(parts).problem
+    both = [blocks_of(one, one.start, 4) for one in (question.problem, late)]
+    first, shifted = (blocks.information for blocks in both)
+    np.testing.assert_allclose(shifted, first, rtol=1e-6, atol=1e-6 * first.max())
+    assert visited_states(late).times == pytest.approx((100.0, 100.0 + _TIME[-1]))
 
 
 def test_a_search_with_more_time_continues_with_the_same_fits(question, tmp_path):

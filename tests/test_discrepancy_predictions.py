@@ -1,5 +1,7 @@
 """Speeds at which a rig's motion changes, with and without a term."""
 
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 
 from jaxcam.discrepancy import event_causes, library
 from jaxcam.discrepancy._event_speeds import event_speeds
+from jaxcam.discrepancy._predictions import _draws
 from jaxcam.discrepancy.terms import WithTerms
 from jaxcam.models import preset, rad_s_to_rpm
 
@@ -63,6 +66,29 @@ def test_the_cause_of_moved_events_is_found(damped):
     assert first.strength == pytest.approx(0.02, rel=1e-4)
     np.testing.assert_allclose(first.speeds, speeds, rtol=1e-8)
     assert first.misfit < 1e-6 < 1 < second.misfit
+
+
+def test_rigs_are_drawn_with_the_values_of_the_first_recording(unchecked_types):
+    """Standard errors 0.1 and 0.2 (10 %, 2000 draws), correlation -0.5, and a parameter
+    that the data do not constrain."""
+    spread = np.array([0.1, 0.2, 0.3, np.inf])
+    correlated = np.eye(4)
+    correlated[0, 1] = correlated[1, 0] = -0.5
+    with np.errstate(invalid="ignore"):
+        covariance = np.where(
+            correlated == 0, 0.0, correlated * np.outer(spread, spread)
+        )
+    labels = (("k", None), ("r", "run0"), ("r", "run1"), ("c", None))
+    fit = SimpleNamespace(
+        point=SimpleNamespace(values=np.array([[7.0, 1.0, 5.0], [7.0, 1.0, 6.0]])),
+        covariance=covariance,
+        estimates=[SimpleNamespace(name=n, record=r) for n, r in labels],
+        problem=SimpleNamespace(records=("run0", "run1"), names=("k", "c", "r")),
+    )
+    rows = np.array(list(_draws(fit, 2000, np.random.default_rng(1))))
+    np.testing.assert_allclose(rows.mean(axis=0), [7.0, 1.0, 5.0], atol=0.02)
+    np.testing.assert_allclose(rows.std(axis=0), [0.1, 0.0, 0.2], rtol=0.1)
+    assert np.corrcoef(rows[:, 0], rows[:, 2])[0, 1] == pytest.approx(-0.5, abs=0.06)
 
 
 def test_what_four_speeds_cannot_decide_is_refused():

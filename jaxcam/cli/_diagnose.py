@@ -78,6 +78,7 @@ def diagnose(
     from ._cache import keep_compiled_programs
     from ._case import notes_of, read
     from ._diagnose_files import write_diagnosis, write_verdict
+    from ._outlook import Outlook
     from ._output import Output
     from ._progress import progress
 
@@ -103,15 +104,21 @@ def diagnose(
             keep=keep,
             policy=_policy(minutes),
         )
-        figures = []
+        figures, outlook, failure = [], Outlook(), None
         if out is not None:
             report("drawing", None)
             figures = write_diagnosis(out, found, notes)
-        outlook = _outlook(found, nominal, predict, propose, seed, report)
+        try:
+            outlook = _outlook(found, nominal, predict, propose, seed, report)
+        except ValueError as error:
+            # the verdict does not depend on predictions and recommendations
+            failure = error
         if out is not None:
             write_verdict(out, found, figures, notes, outlook)
     _print(output, found, notes, outlook)
     output.write_json({**found.to_json(), **outlook.data()})
+    if failure is not None:
+        raise failure
 
 
 def _policy(minutes: float | None):

@@ -1,7 +1,7 @@
 """Predict the behaviour of a rig, with and without the missing physics."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import equinox as eqx
@@ -91,21 +91,37 @@ def _speeds(
 ) -> list[tuple[float, float]]:
     """Return the speeds and their standard errors."""
     row = np.asarray(fit.point.values[0])
-    free = [fit.problem.names.index(one.name) for one in fit.estimates]
     best = event_speeds(_system(fit, row, names, present), policy)
-    scale = np.sqrt(np.diag(fit.covariance))
-    root = np.linalg.cholesky(
-        fit.covariance / np.outer(scale, scale) + _DEFINITE * np.eye(len(scale))
-    )
     drawn = []
-    for k in range(policy.drawn_rigs):
-        moved = row.copy()
-        moved[free] += scale * (root @ rng.standard_normal(len(free)))
+    for k, moved in enumerate(_draws(fit, policy.drawn_rigs, rng)):
         drawn.append(best.near(_system(fit, moved, names, present)).values)
         if progress is not None:
             progress((k + 1) / policy.drawn_rigs)
     errors = [_spread(column) for column in np.array(drawn).T]
     return [(float(v), e) for v, e in zip(best.values, errors)]
+
+
+def _draws(fit: Fit, number: int, rng) -> Iterator[np.ndarray]:
+    """Return parameter values of the first recording, drawn from their distribution.
+
+    Parameters that the data do not constrain keep their values.
+    """
+    row, spread = np.asarray(fit.point.values[0]), np.sqrt(np.diag(fit.covariance))
+    kept = [
+        k
+        for k, one in enumerate(fit.estimates)
+        if one.record in (None, fit.problem.records[0]) and np.isfinite(spread[k])
+    ]
+    free = [fit.problem.names.index(fit.estimates[k].name) for k in kept]
+    scale = spread[kept]
+    root = np.linalg.cholesky(
+        fit.covariance[np.ix_(kept, kept)] / np.outer(scale, scale)
+        + _DEFINITE * np.eye(len(scale))
+    )
+    for _ in range(number):
+        moved = row.copy()
+        moved[free] += scale * (root @ rng.standard_normal(len(free)))
+        yield moved
 
 
 def _spread(drawn: np.ndarray) -> float:

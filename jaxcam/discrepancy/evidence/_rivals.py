@@ -72,11 +72,13 @@ def _parts(one: Missing) -> frozenset[str]:
 
 def _costs(found: Fit, policy: Policy) -> Float[np.ndarray, " b"]:
     """Return the cost of the samples of each section of each recording."""
-    longest = max(part.recording.time[-1] for part in found.problem.segments)
+    problem = found.problem
+    longest = max(part.recording.duration for part in problem.segments)
     edges = np.linspace(0.0, longest, policy.stretches + 1)[1:-1]
-    rows = {name: k for k, name in enumerate(found.problem.records)}
+    rows = {name: k for k, name in enumerate(problem.records)}
     costs = np.zeros((len(rows), policy.stretches))
     for part in residuals(found):
-        place = np.searchsorted(edges, part.time)
-        np.add.at(costs[rows[part.record]], place, (part.value / part.noise) ** 2)
+        row = rows[part.record]
+        place = np.searchsorted(edges, part.time - problem.begun[row])
+        np.add.at(costs[row], place, (part.value / part.noise) ** 2)
     return costs.ravel()

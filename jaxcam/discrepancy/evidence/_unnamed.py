@@ -29,12 +29,12 @@ def without_a_name(
     if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
         return None, None, ()
     visited = visited_states(problem)
-    positions, velocities, approach, duration = visited.ranges(policy)
+    positions, velocities, approach, times = visited.ranges(policy)
     offered = families(
         positions,
         velocities,
         approach,
-        duration,
+        times,
         turned=question.turned,
         gaps=_gaps_with_impacts(question, policy),
         slip=question.references.slip_speed,

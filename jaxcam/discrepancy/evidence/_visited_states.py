@@ -18,7 +18,7 @@ _SLOWEST = 1e-3
 
 
 class VisitedStates(NamedTuple):
-    """Values of each variable in the recordings, and their duration (s).
+    """Values of each variable in the recordings; of the time (s), first and last.
 
     Positions are those of the state: offset and gain of the sensor are removed.
     `strides` are the changes of each variable in one integration step of fast motion.
@@ -27,13 +27,11 @@ class VisitedStates(NamedTuple):
     position: Float[np.ndarray, " _"]
     velocity: Float[np.ndarray, " _"]
     approach: Float[np.ndarray, " _"]
-    duration: float
+    times: tuple[float, float]
     strides: Mapping[Variable, float]
 
     def ranges(self, policy: Policy):
-        """Return the ranges of position, velocity and approach speed, and the
-        duration.
-        """
+        """Return the ranges of position, velocity, approach speed and time."""
         tail = policy.velocity_tail
         return (
             (float(self.position.min()), float(self.position.max())),
@@ -42,7 +40,7 @@ class VisitedStates(NamedTuple):
                 float(np.quantile(self.velocity, 1 - tail)),
             ),
             (0.0, float(np.max(self.approach, initial=_SLOWEST))),
-            self.duration,
+            self.times,
         )
 
     def near(
@@ -87,7 +85,10 @@ def visited_states(problem: Problem) -> VisitedStates:
         position[np.isfinite(position)],
         states[:, rate],
         speeds[np.isfinite(speeds) & (speeds > 0)],
-        max(part.recording.duration for part in problem.segments),
+        (
+            min(float(part.recording.time[0]) for part in problem.segments),
+            max(float(part.recording.time[-1]) for part in problem.segments),
+        ),
         _strides(problem, exists, states[:, rate], push),
     )
 

@@ -70,13 +70,14 @@ def blocks_of(
     """
     columns = free_columns(problem, names)
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
-    longest = max(part.recording.time[-1] for part in problem.segments)
+    longest = max(part.recording.duration for part in problem.segments)
     edges = np.linspace(0.0, longest, slices + 1)
     edges[0], edges[-1] = -np.inf, np.inf
     size = len(columns.scale)
     record, start, information, score = [], [], [], []
     for a, b in zip(edges, edges[1:]):
-        found = _assembled(problem, problem.between(a, b), point, local, scales)
+        inside = problem.between(problem.begun + a, problem.begun + b)
+        found = _assembled(problem, inside, point, local, scales)
         found = jax.tree.map(np.asarray, eliminate_states(found))
         for r, (name, place) in enumerate(zip(problem.records, columns.place)):
             # a parameter with separate values has a row for each recording

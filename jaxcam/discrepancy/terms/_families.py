@@ -163,7 +163,7 @@ def families(
     positions: tuple[float, float],
     velocities: tuple[float, float],
     approach: tuple[float, float],
-    duration: float,
+    times: tuple[float, float],
     *,
     turned: bool,
     gaps: Sequence[int],
@@ -173,15 +173,15 @@ def families(
 ) -> tuple[Family, ...]:
     """Return all families over the ranges that the recordings visit.
 
-    **Arguments:** smallest and largest position, velocity and approach speed, the
-    duration of the recordings (s), whether there is a drive with a phase, the indices
+    **Arguments:** smallest and largest position, velocity, approach speed and time (s),
+    whether there is a drive with a phase, the indices
     of the gaps with impacts, the slip speed, the unit of the motion, and the changes of
     the arguments in an integration step.
     """
     ranges = {
         Variable.POSITION: positions,
         Variable.VELOCITY: velocities,
-        Variable.TIME: (0.0, duration),
+        Variable.TIME: times,
         Variable.APPROACH: approach,
         Variable.PHASE: (0.0, 2 * math.pi),
     }

@@ -298,14 +298,14 @@ def shapes(
     positions: tuple[float, float],
     velocities: tuple[float, float],
     approach: tuple[float, float],
-    duration: float,
+    times: tuple[float, float],
     turned: bool = True,
     references: References = References(),
 ) -> tuple[Shape, ...]:
     """Return all shapes, over the ranges that the recordings visit.
 
-    **Arguments:** smallest and largest position, velocity and approach speed, the
-    duration of the recordings (s), whether there is a drive with a phase, and the
+    **Arguments:** smallest and largest position, velocity, approach speed and time (s),
+    whether there is a drive with a phase, and the
     constants of the terms.
     """
 
@@ -316,13 +316,13 @@ def shapes(
     found: list[Shape] = [
         ForceOfAngle(zeros(ForceOfAngle), *positions),
         ForceOfVelocity(zeros(ForceOfVelocity), *velocities),
-        ForceOfTime(zeros(ForceOfTime), 0.0, duration),
+        ForceOfTime(zeros(ForceOfTime), *times),
         FrictionOfAngle(zeros(FrictionOfAngle), *positions, first=0, slip=slip),
         RestitutionOfSpeed(zeros(RestitutionOfSpeed), *approach),
-        RestitutionOfTime(zeros(RestitutionOfTime), 0.0, duration),
+        RestitutionOfTime(zeros(RestitutionOfTime), *times),
         # no degrees 0 and 1, which are an offset and a gain error of the sensor
         SensorOfPosition(zeros(SensorOfPosition), *positions, first=2),
-        SensorOfTime(zeros(SensorOfTime), 0.0, duration),
+        SensorOfTime(zeros(SensorOfTime), *times),
     ]
     if turned:
         found += [

@@ -53,7 +53,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
 from ...recordings import RecordingError, Segments
 from ._known_constants import known_constants
@@ -260,14 +260,20 @@ class Problem:
         every = self.everything()
         return Weights(every.flown * keep[:, None], every.rested * keep[:, None])
 
-    def between(self, start: float, stop: float) -> Weights:
+    @property
+    def begun(self) -> Float[np.ndarray, " records"]:
+        """Return the time (s) at which each recording begins."""
+        return np.array([part.recording.time[0] for part in self.segments])
+
+    def between(self, start: ArrayLike, stop: ArrayLike) -> Weights:
         """Return weights that count only the pieces of each recording that begin in a
-        time span (s).
+        time span (s); the span may differ between recordings, `(records,)`.
         """
+        low, high = (np.expand_dims(np.asarray(t), -1) for t in (start, stop))
 
         def inside(samples):
             begin = np.asarray(samples.start)
-            return (begin >= start) & (begin < stop)
+            return (begin >= low) & (begin < high)
 
         every = self.everything()
         return Weights(
