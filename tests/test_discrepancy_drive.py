@@ -56,7 +56,7 @@ def test_a_ripple_that_half_of_the_redrawn_sets_lack_is_none():
     known = dict.fromkeys(
         ("eps", "eps_stderr", "psi", "psi_stderr", "p_value", "dispersion"), 1e-6
     )
-    for inclusion, named in ((0.5, False), (policy.sure, True)):
+    for inclusion, named in ((0.5, False), (policy.confidence, True)):
         ripple = Ripple(
             **known,
             gain=23.3,

@@ -316,8 +316,20 @@ def test_the_error_rate_decides_and_budgets_do_not():
     strict = _diagnosed(motions, policy=Policy(false_alarms=1e-12))
     assert (strict.verdict, strict.names) == (Verdict.NONE, ())
     assert strict.policy.false_alarms == 1e-12
-    narrow = Policy(quick_iterations=30, kept=1, tried=2, leads=5.0, bootstrap=400)
-    wide = Policy(iterations=120, kept=6, tried=12, late=16, crawl_attempts=8)
+    narrow = Policy(
+        quick_iterations=30,
+        extended_subsets=1,
+        fitted_subsets=2,
+        lead_bic=5.0,
+        bootstrap=400,
+    )
+    wide = Policy(
+        iterations=120,
+        extended_subsets=6,
+        fitted_subsets=12,
+        late_attempts=16,
+        crawl_attempts=8,
+    )
     for policy in (narrow, wide):
         other = _diagnosed(motions, policy=policy)
         assert (other.verdict, other.names) == (found.verdict, found.names)

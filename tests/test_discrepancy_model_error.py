@@ -202,7 +202,7 @@ def test_a_search_with_more_time_continues_with_the_same_fits(question, tmp_path
     few, many = (
         KeptTrials(tmp_path, question.problem, Policy(minutes=m)) for m in (5.0, 60.0)
     )
-    other = KeptTrials(tmp_path, question.problem, Policy(sure=0.8))
+    other = KeptTrials(tmp_path, question.problem, Policy(confidence=0.8))
     assert few.mark == many.mark != other.mark
 
 

@@ -151,7 +151,7 @@ def test_shapes_are_drawn_with_units_on_both_axes():
 
 
 def test_every_shape_has_a_quantity_whose_unit_is_known():
-    offered = shapes((0.2, 0.4), (-1.0, 1.0), (0.0, 2.0), 4.0)
+    offered = shapes((0.2, 0.4), (-1.0, 1.0), (0.0, 2.0), (0.0, 4.0))
     assert {one.variable for one in offered} == set(Variable)
     units = {Variable(one.variable): unit_along(one.variable, "m") for one in offered}
     assert units == {

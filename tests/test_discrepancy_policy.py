@@ -43,7 +43,7 @@ def test_the_page_states_every_number_of_the_policy(group):
 def test_the_page_states_every_free_function():
     rows = [
         [f"`{one.name}`", one.sentence, str(one.variable), str(one.count)]
-        for one in shapes((0.0, 1.0), (-1.0, 1.0), (0.0, 1.0), 1.0)
+        for one in shapes((0.0, 1.0), (-1.0, 1.0), (0.0, 1.0), (0.0, 1.0))
     ]
     table = _table(["shape", "meaning", "variable", "coefficients"], rows)
     assert table in _PAGE, f"put this table into docs/discrepancy.md:\n\n{table}"
@@ -165,7 +165,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
 
 
 def test_what_can_be_derived_is():
-    policy = Policy(sure=0.95, form_error=0.2)
+    policy = Policy(confidence=0.95, form_error=0.2)
     assert policy.beyond == pytest.approx(norm.ppf(0.95), rel=1e-15)
     # a force that is off by a share leaves its square in the likelihood
     assert policy.small == pytest.approx(0.04, rel=1e-15)
@@ -176,7 +176,7 @@ def test_what_can_be_derived_is():
     [
         {"false_alarms": 0.0},
         {"false_alarms": 1.0},
-        {"sure": -0.1},
+        {"confidence": -0.1},
         {"iterations": 0},
         {"tie": float("nan")},
         {"drive_orders": (1.25, -1.0)},
@@ -188,10 +188,10 @@ def test_a_policy_out_of_range_is_refused(wrong):
 
 
 def test_a_budget_bounds_the_search():
-    """A fit that always gains, and never enough, is late after `late` attempts."""
+    """A fit that always gains, and never enough, is late after `late_attempts`."""
     costs = [2000.0 * 0.9**k for k in range(16)]
     for late in (3, 8, 12):
-        stop = given_up(100, Policy(late=late), beaten=100.0)
+        stop = given_up(100, Policy(late_attempts=late), beaten=100.0)
         first = next(k for k in range(1, 16) if stop(costs[:k]))
         assert first == late + 1
 
@@ -242,7 +242,7 @@ def test_free_friction_changes_sign_at_the_speed_of_the_rig():
         (0.0, 1.0),
         (-1.0, 1.0),
         (0.0, 1.0),
-        1.0,
+        (0.0, 1.0),
         references=References(free_slip_speed=0.2),
     )
     friction = next(one for one in offered if one.name == "friction_of_position")

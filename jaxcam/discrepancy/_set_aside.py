@@ -18,14 +18,14 @@ def odd_record(found: Fit, policy: Policy) -> str | None:
     one.
 
     There must be at least `policy.records_apart` recordings. The cost per sample of the
-    unexplained recording must be at least `policy.near`, and at least `policy.odd`
-    times that of every other recording.
+    unexplained recording must be at least `policy.near_cost`, and at least
+    `policy.odd_ratio` times that of every other recording.
     """
     costs = cost_by_record(found)
     if len(costs) < policy.records_apart:
         return None
     worst, second = sorted(costs.values(), reverse=True)[:2]
-    if worst < policy.near or worst < policy.odd * max(second, 1.0):
+    if worst < policy.near_cost or worst < policy.odd_ratio * max(second, 1.0):
         return None
     return max(costs, key=lambda name: costs[name])
 
@@ -51,7 +51,9 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     recording, and its name.
     """
     costs = cost_by_record(found.after)
-    better = max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd
+    better = (
+        max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd_ratio
+    )
     chosen = again if better else found
     done = "is excluded" if better else "is not explained by any of the terms tried"
     sentence = (

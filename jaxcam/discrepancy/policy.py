@@ -39,7 +39,7 @@ class Policy:
         "probability that any term is named although nothing is missing; divided among "
         "the terms and the frequencies of a scan (Bonferroni)",
     )
-    sure: float = decides(
+    confidence: float = decides(
         0.9,
         "fraction of the bootstrap samples that must retain a named term, and "
         "probability that an effect at its detection limit is named",
@@ -65,17 +65,17 @@ class Policy:
         "maximum fraction of the explained cost that the smoothing of dry friction may "
         "cause; a term that explains less is not named together with a friction term",
     )
-    differs: float = decides(
+    separate_gain: float = decides(
         0.5,
         "minimum fraction of the misfit that separate parameter values for each "
         "recording must explain",
     )
-    as_much: float = decides(
+    common_gain: float = decides(
         0.9,
         "minimum gain of a function common to all recordings, relative to that of "
         "separate parameter values",
     )
-    near: float = decides(
+    near_cost: float = decides(
         4.0, "cost per sample below which a fit counts as near the data"
     )
     explains: float = decides(
@@ -83,12 +83,12 @@ class Policy:
         "far from the data, maximum fraction of a smaller model's cost that a model "
         "may leave",
     )
-    alike: float = decides(
+    distinct_information: float = decides(
         1e-8,
         "minimum fraction of the information on a parameter that must remain when the "
         "other parameters are free",
     )
-    untold: float = decides(
+    half_information: float = decides(
         1e-3,
         "minimum fraction of the information on a term that one half of the recordings "
         "must contain to estimate the term",
@@ -125,7 +125,7 @@ class Policy:
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),
         "non-harmonic multiples of the rotation frequency at which leakage is measured",
     )
-    odd: float = decides(
+    odd_ratio: float = decides(
         10.0,
         "a recording is excluded if its cost per sample is at least this many times "
         "that of any other recording",
@@ -136,7 +136,14 @@ class Policy:
     noisier: float = decides(
         1.2, "ratio of measured to stated noise above which the measured noise is used"
     )
-
+    as_noise: float = decides(
+        1.2,
+        "ratio of rms residual to noise up to which a residual counts as noise; above "
+        "it, a caveat is added",
+    )
+    cost_errors: float = decides(
+        3.0, "largest excess cost, in standard deviations, that is attributed to noise"
+    )
     model_error: float = decides(
         100.0,
         "rms residual with the best named terms, in units of the noise, above which "
@@ -165,23 +172,25 @@ class Policy:
     state_gain: float = bounds(
         1e-3, "reduction of the cost below which these Newton steps end"
     )
-    kept: int = bounds(3, "number of subsets of each size that are extended")
-    tried: int = bounds(6, "number of subsets fitted at each size above one")
-    leads: float = bounds(
+    extended_subsets: int = bounds(
+        3, "number of subsets of each size that are extended"
+    )
+    fitted_subsets: int = bounds(6, "number of subsets fitted at each size above one")
+    lead_bic: float = bounds(
         50.0, "difference in BIC up to which a subset or a form is followed further"
     )
-    helped: float = bounds(
+    helpful_cost: float = bounds(
         0.7, "the search goes on if a term reduces the cost to less than this fraction"
     )
-    clear: float = bounds(
+    clear_gain: float = bounds(
         10.0,
         "multiple of the required gain above which a loss of fit need not be accurate",
     )
-    astray: float = bounds(
+    astray_shift: float = bounds(
         3.0,
         "parameter shift, in prior standard deviations, beyond which a fit restarts",
     )
-    hopeless: float = bounds(
+    hopeless_cost: float = bounds(
         2.0, "multiple of the smallest cost above which a fit is not refined further"
     )
     explained: float = bounds(
@@ -196,7 +205,7 @@ class Policy:
     crawl_gain: float = bounds(
         0.01, "relative reduction of the cost below which these steps count as slow"
     )
-    late: int = bounds(
+    late_attempts: int = bounds(
         8, "step attempts after which the cost must be below that of the smaller subset"
     )
     functions: int = bounds(
@@ -205,7 +214,7 @@ class Policy:
     elements: int = bounds(
         1, "use of elements with internal states; 0: never, 1: if needed, 2: always"
     )
-    little: float = bounds(
+    element_misfit: float = bounds(
         0.1,
         "if model errors are allowed for, fraction of the misfit below which a "
         "residual is not worth an element with an internal state",
@@ -226,17 +235,17 @@ class Policy:
     followed: int = bounds(
         3, "maximum number of free functions, terms and forms fitted per stage"
     )
-    outdone: float = bounds(1.25, "maximum cost of a form, relative to the curve's")
-    enough: float = bounds(
+    form_cost: float = bounds(1.25, "maximum cost of a form, relative to the curve's")
+    negligible_residual: float = bounds(
         0.1, "fraction of the tolerated residual below which the search ends"
     )
-    heats: int = bounds(
+    prior_fits: int = bounds(
         4, "maximum number of fits of a free function in which its prior must converge"
     )
-    recentred: int = bounds(
+    element_fits: int = bounds(
         12, "maximum number of additional fits for the parameters of an element"
     )
-    heated: float = bounds(
+    prior_settled: float = bounds(
         1.5, "ratio of consecutive costs below which the prior has converged"
     )
     bootstrap: int = bounds(
@@ -282,9 +291,6 @@ class Policy:
     shown_chance: float = shows(
         1e-3, "significance level at which a recording shows a named effect"
     )
-    as_noise: float = shows(
-        1.2, "ratio of rms residual to noise above which a caveat is added"
-    )
     decoy: float = shows(
         0.5, "fraction of a function's gain that its decoy may reach without a caveat"
     )
@@ -296,9 +302,6 @@ class Policy:
     )
     absent_errors: float = shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"
-    )
-    cost_errors: float = bounds(
-        3.0, "largest excess cost, in standard deviations, that is attributed to noise"
     )
     nearby: float = shows(
         0.03,
@@ -312,7 +315,7 @@ class Policy:
     alternatives: int = shows(8, "maximum number of alternatives listed")
 
     def __post_init__(self):
-        for name in ("false_alarms", "sure", "explains", "form_error"):
+        for name in ("false_alarms", "confidence", "explains", "form_error"):
             value = getattr(self, name)
             if not 0 < value < 1:
                 raise ValueError(
@@ -330,9 +333,9 @@ class Policy:
     @property
     def beyond(self) -> float:
         """Number of standard errors by which an effect must exceed the threshold to be
-        detected with probability `sure`.
+        detected with probability `confidence`.
         """
-        return float(norm.ppf(self.sure))
+        return float(norm.ppf(self.confidence))
 
     @property
     def small(self) -> float:

@@ -81,9 +81,9 @@ def acting_alike(trials: Trials, best: Trial, name: str) -> Iterator[str]:
             continue
         row = int(blocks.rows([strengths[0].name])[0])
         alone = _left(information, row, others)
-        if alone > trials.policy.untold * information[row, row]:
+        if alone > trials.policy.half_information * information[row, row]:
             beside = _left(information, row, free)
-            if beside < trials.policy.untold * alone:
+            if beside < trials.policy.half_information * alone:
                 yield term.name
 
 

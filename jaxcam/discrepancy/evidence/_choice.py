@@ -211,7 +211,7 @@ def _settled(
     if different is None or not _explains(different, bic):
         return False
     common = [one.gain for one in left if one.significant]
-    return max(common, default=0.0) < policy.as_much * different.gained
+    return max(common, default=0.0) < policy.common_gain * different.gained
 
 
 def _explains(different: Differing, bic: float) -> bool:

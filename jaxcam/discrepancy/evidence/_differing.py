@@ -82,7 +82,7 @@ def differing(found: Fit, policy: Policy, terms: int = 0) -> Differing | None:
     halves = blocks_of(problem, found.point, 2, found.free)
     gains = {name: _gain(halves, name) for name in shared}
     promising = sorted(shared, key=lambda name: -gains[name])[: policy.followed]
-    best, share = None, policy.differs
+    best, share = None, policy.separate_gain
     for name in promising:
         if gains[name] > least and _foretold(halves, name) > 0:
             one = _separated(found, name, policy, share)

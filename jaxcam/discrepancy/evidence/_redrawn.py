@@ -32,7 +32,7 @@ def sure(
             sizes, key=lambda n: (min(sizes[n], 1.0), inclusion[n]), default=None
         )
         if least is None or (
-            sizes[least] >= 1 and inclusion[least] >= trials.policy.sure
+            sizes[least] >= 1 and inclusion[least] >= trials.policy.confidence
         ):
             return best, inclusion, deviation, doubtful
         doubtful.append((least, inclusion[least]))

@@ -57,7 +57,7 @@ class Ripple:
         """
         chance = chi2.isf(policy.false_alarms / tests, 2)
         asked = max(2 * math.log(self.count), chance)
-        return bool(self.gain > asked) and self.inclusion >= policy.sure
+        return bool(self.gain > asked) and self.inclusion >= policy.confidence
 
     @property
     def delta_bic(self) -> float:

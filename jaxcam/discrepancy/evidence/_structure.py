@@ -149,7 +149,9 @@ def structures(
         free = blocks.rows(response.free)
         for k, term in enumerate(terms):
             own = blocks.rows([p.name for p in term.parameters(place + k)])
-            grown = added_gain(information, score, free, own, policy.alike)
+            grown = added_gain(
+                information, score, free, own, policy.distinct_information
+            )
             threshold = _threshold(len(own), problem.samples, tests, policy)
             shape = _shape(term, blocks, information, score, free, own, seen, policy)
             predicted = math.inf

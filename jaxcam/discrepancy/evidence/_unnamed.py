@@ -24,7 +24,7 @@ def without_a_name(
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     problem = question.problem
-    near = best.fit.cost < policy.near * problem.samples
+    near = best.fit.cost < policy.near_cost * problem.samples
     small = policy.small if near else policy.corner_share
     if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
         return None, None, ()
@@ -102,7 +102,7 @@ def _needed(
             fitted.problem, fitted, parts, prices, policy, seed, names=fitted.free
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
-        if needed.inclusion[least] >= policy.sure:
+        if needed.inclusion[least] >= policy.confidence:
             return found._replace(decoys=decoys_of(search.first or (), found)), needed
         if len(parts) < 2:
             break

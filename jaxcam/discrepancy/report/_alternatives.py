@@ -83,7 +83,7 @@ def rival_name(rival: Rival) -> str:
 
 def _why_not(rival: Rival, policy: Policy) -> str:
     found = rival.missing.fit
-    if found.cost > policy.near * found.problem.samples:
+    if found.cost > policy.near_cost * found.problem.samples:
         return "its fit did not come close to the data"
     return f"would be chosen in {rival.share:.0%} of the bootstrap samples"
 
@@ -109,7 +109,9 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
             gain = trials.scan(best.names).best[1]
         else:
             own = blocks.rows([one.name for one in term.strengths()])
-            gain = added_gain(information, score, free, own, trials.policy.alike)
+            gain = added_gain(
+                information, score, free, own, trials.policy.distinct_information
+            )
         asked = trials.threshold(term.name)
         reason = (
             f"would increase twice the log-likelihood by {max(gain, 0.0):.3g}, where "

@@ -297,7 +297,7 @@ def _against(trials: Trials, share: float) -> str:
     """Return the evidence against a term that improves the fit in a fraction of the
     bootstrap samples.
     """
-    if share >= trials.policy.sure:
+    if share >= trials.policy.confidence:
         return "its strength varies so much between blocks that it might be zero"
     return f"it improves the fit in only {share:.0%} of the bootstrap samples"
 

@@ -84,7 +84,7 @@ def covariance_of(found: Fit, names: Sequence[str], policy: Policy):
     If the fit is far from the data, its own covariance may contain pieces whose
     derivatives diverge; these are left out here.
     """
-    if found.cost < policy.near * found.problem.samples:
+    if found.cost < policy.near_cost * found.problem.samples:
         labels = [estimate.name for estimate in found.estimates]
         rows = [labels.index(name) for name in names]
         return found.covariance[np.ix_(rows, rows)]

@@ -200,7 +200,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     """
     left, held = missing.fit, choice.held
     for rival in choice.rivals:
-        if rival.share > 1 - policy.sure:
+        if rival.share > 1 - policy.confidence:
             yield functions_tie(rival_name(rival), rival)
     share = max((share for _, share in missing.decoys), default=0.0)
     if share > policy.decoy:

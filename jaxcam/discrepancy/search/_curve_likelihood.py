@@ -54,7 +54,7 @@ class CurveLikelihood(NamedTuple):
         heat, labels = heat_of(found.fit), one.coefficients
         subset = Subset(found.problem, found.functions, found.names)
         quadratic = fits.quadratic(subset, found.fit.point, heat, one)
-        inside, pull = beside(*quadratic, fits.policy.alike)
+        inside, pull = beside(*quadratic, fits.policy.distinct_information)
         columns = [found.problem.names.index(name) for name in labels]
         value = np.asarray(found.fit.point.values)[0, columns]
         slope = inside @ value + pull

@@ -53,7 +53,7 @@ class ElementNeed:
         if found is None:
             return self.comparable
         heat = heat_of(found.fit)
-        if heat <= self.policy.near:
+        if heat <= self.policy.near_cost:
             return self.comparable or self._promised(problem, found) > least
         left = (found.fit.cost - found.fit.problem.samples) / heat
         return self._promised(problem, found) > max(least, self.policy.explains * left)

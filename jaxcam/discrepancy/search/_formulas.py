@@ -108,7 +108,7 @@ class _Trials:
             self.sound.append(trial)
             if trial.score < self.found.score:
                 # only a form with a similar predicted gain may have more evidence
-                least = max(least, gain - self.fits.policy.leads)
+                least = max(least, gain - self.fits.policy.lead_bic)
             if form.special is not None:
                 names = _in_slot(trial, self.one.slot).coefficients[:-1]
                 numbers = np.array([trial.fit[name].value for name in names])
@@ -121,7 +121,7 @@ class _Trials:
         price = start.primitive.count * likelihood.price
         lost = heat_of(self.found.fit) * (likelihood.gain - start.gain - price)
         worse = lost + price - likelihood.freedom
-        return worse < self.fits.policy.form_loss + self.fits.policy.leads
+        return worse < self.fits.policy.form_loss + self.fits.policy.lead_bic
 
 
 def _in_slot(found: Missing, slot: str):
@@ -145,7 +145,9 @@ def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
-    return found.fit.cost < samples + max(surplus, fits.policy.enough * small)
+    return found.fit.cost < samples + max(
+        surplus, fits.policy.negligible_residual * small
+    )
 
 
 def _fitted(
@@ -168,7 +170,7 @@ def _fitted(
     columns = [problem.names.index(name) for name in form.coefficients]
     values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
-    beaten = max(fits.policy.outdone * found.fit.cost, found.fit.cost + small)
+    beaten = max(fits.policy.form_cost * found.fit.cost, found.fit.cost + small)
     if shows_apart(one.family):
         # with disconnected pieces, the fit is an almost linear problem
         subset = Subset(apart, functions, found.names)

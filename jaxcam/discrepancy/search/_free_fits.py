@@ -91,7 +91,7 @@ class FreeFits:
         heat, point, found = 1.0, start, None
         # in each fit, the parameters of a hidden element can change by a limited step
         hidden = any(isinstance(one, Hidden) for one in functions)
-        turns = policy.heats + (policy.recentred if hidden else 0)
+        turns = policy.prior_fits + (policy.element_fits if hidden else 0)
         for turn in range(turns):
             last = turn + 1 == turns
             problem = filled(subset.problem, functions)
@@ -106,7 +106,7 @@ class FreeFits:
             point, before, heat = found.point, heat, heat_of(found)
             if not math.isfinite(found.cost):
                 break
-            settled = max(heat, before) < policy.heated * min(heat, before)
+            settled = max(heat, before) < policy.prior_settled * min(heat, before)
             if functions and not last:
                 fresh = self._rougher(subset, functions, point, heat)
                 settled = settled and _alike(fresh, functions)
@@ -263,7 +263,7 @@ class FreeFits:
 
         ordered = sorted(functions, key=first)
         spread = np.concatenate([one.spread for one in ordered])
-        return occam(information, rows, own, spread, self.policy.alike)
+        return occam(information, rows, own, spread, self.policy.distinct_information)
 
 
 def _known(information, blocks, one: Part) -> None:

@@ -139,7 +139,7 @@ class FreeSearch:
             return True
         samples, policy = found.problem.samples, self.policy
         left, rest = found.fit.cost - samples, whole.fit.cost - samples
-        return heat_of(found.fit) > policy.near and rest < policy.explains * left
+        return heat_of(found.fit) > policy.near_cost and rest < policy.explains * left
 
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
@@ -155,7 +155,7 @@ class FreeSearch:
         recordings, except those that single pieces of flight rule out.
         """
         fitted = {one.label for trial in self.tried for one in trial.functions}
-        most = self.policy.hopeless * min(self.alone.values(), default=math.inf)
+        most = self.policy.hopeless_cost * min(self.alone.values(), default=math.inf)
         return [
             lead
             for lead in self.first or []
@@ -185,7 +185,7 @@ class FreeSearch:
             return self.need.preferred
         if self.roughly and self.need.driven is not None:
             left = self.cost if found is None else found.fit.cost
-            return left > self.policy.little * self.cost
+            return left > self.policy.element_misfit * self.cost
         least = self._least()
         if found is not None:
             least = max(least, self._small(found) / heat_of(found.fit))
@@ -336,14 +336,16 @@ class FreeSearch:
         left_out = self.left_out.quadratic(found, out, every)
         quadratic = left_out.information, left_out.score, left_out.kept
         gains = {
-            t: added_gain(*quadratic, left_out.blocks.rows(own), self.policy.alike)
+            t: added_gain(
+                *quadratic, left_out.blocks.rows(own), self.policy.distinct_information
+            )
             for t, own in strengths.items()
         }
         if not gains:
             return None
         name = max(gains, key=lambda one: gains[one])
         left = left_out.worse - gain(*quadratic) - gains[name]
-        allowed = self.policy.leads * heat_of(found.fit)
+        allowed = self.policy.lead_bic * heat_of(found.fit)
         return name if left < allowed + self._small(found) else None
 
     def without(self, found: Missing, label: str) -> Missing:

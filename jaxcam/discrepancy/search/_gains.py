@@ -22,8 +22,8 @@ def added_gain(information, score, free, new, alike: float) -> float:
     freed in addition to the `free` ones.
 
     If the free parameters represent a combination of the new ones so well that less
-    than a fraction `alike` of the information on it remains, the gain of this
-    combination is zero, because only rounding errors would be left.
+    than a fraction `distinct_information` of the information on it remains, the gain of
+    this combination is zero, because only rounding errors would be left.
     """
     new = np.setdiff1d(new, free)
     if not len(new):
@@ -61,7 +61,7 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
     own = np.diag(information)[new]
     scale = 1 / np.sqrt(np.where(own > 0, own, np.inf))
     values, vectors = np.linalg.eigh(rest * np.outer(scale, scale))
-    seen = values > policy.alike
+    seen = values > policy.distinct_information
     # combinations distinguishable from the free parameters, each with unit information
     basis = scale[:, None] * vectors[:, seen] / np.sqrt(values[seen])
     total = 0.0
@@ -69,7 +69,7 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
         known = np.isin(blocks.record, half).astype(float)
         inside, pull = _beside(*blocks.total(known), free, new, basis)
         values, vectors = np.linalg.eigh(inside)
-        told = values > policy.untold
+        told = values > policy.half_information
         step = vectors[:, told] @ ((vectors[:, told].T @ pull) / values[told])
         inside, pull = _beside(*blocks.total(1 - known), free, new, basis)
         total += float(2 * step @ pull - step @ inside @ step)

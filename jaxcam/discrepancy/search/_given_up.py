@@ -28,7 +28,7 @@ def given_up(
     """
 
     def stop(costs: Sequence[float]) -> bool:
-        late = len(costs) > policy.late and costs[-1] > beaten
+        late = len(costs) > policy.late_attempts and costs[-1] > beaten
         return late or (costs[-1] > decides and crawls(costs, samples, policy))
 
     return stop

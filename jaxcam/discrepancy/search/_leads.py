@@ -183,7 +183,9 @@ class Leads:
         rows = blocks.rows(free)
         for term in terms:
             own = blocks.rows([one.name for one in term.strengths()])
-            grown = added_gain(information, score, rows, own, self.policy.alike)
+            grown = added_gain(
+                information, score, rows, own, self.policy.distinct_information
+            )
             price = len(own) * math.log(problem.samples)
             yield Lead(grown / heat - price, term.name)
 

@@ -92,7 +92,7 @@ class LeftOut:
             if len(found.functions) + len(found.names) < 2:
                 break
             least = allowed(found)
-            if self.predicted_loss(found, one) > self.policy.clear * least:
+            if self.predicted_loss(found, one) > self.policy.clear_gain * least:
                 continue
             less = self.fits.fitted(*self.subset(found, one))
             if less.score - found.score < least:

@@ -58,7 +58,7 @@ def with_model_error(question: Question, policy: Policy) -> Question | None:
         ModelError(name, stated, rms, max(stated, policy.resolved * rms))
         for name, (stated, rms) in _residuals(found).items()
     )
-    if not any(one.residual**2 > policy.near * one.stated**2 for one in errors):
+    if not any(one.residual**2 > policy.near_cost * one.stated**2 for one in errors):
         return None
     model = found.problem.model
     sensors = dict(model.sensors)

@@ -54,7 +54,7 @@ def placing(
         for k, start in enumerate(some):
             own = size + k * count + linear
             rest, left = _beside(information, score, np.arange(size), own)
-            grown = _signed_gain(rest, left, low, high, policy.alike)
+            grown = _signed_gain(rest, left, low, high, policy.distinct_information)
             if grown > best.gain:
                 best = Placing(grown, start)
     return best

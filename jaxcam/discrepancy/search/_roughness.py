@@ -44,7 +44,7 @@ def roughness(
     its jump at zero velocity; the values of these coefficients at the point; the
     policy. The gain is relative to the likelihood at the point.
     """
-    inside, pull = beside(information, score, free, own, policy.alike)
+    inside, pull = beside(information, score, free, own, policy.distinct_information)
     count = len(own) - 1
     seen = float(np.trace(inside))
     if not seen > 0:
@@ -82,8 +82,8 @@ def beside(information, score, free, own, alike: float):
     """Return information and score of some rows, with the free parameters eliminated.
 
     If the free parameters represent a combination of these rows so well that less than
-    a fraction `alike` of the information on it remains, its information and score are
-    zero, because only rounding errors would be left.
+    a fraction `distinct_information` of the information on it remains, its information
+    and score are zero, because only rounding errors would be left.
     """
     free = np.setdiff1d(free, own)
     free = free[np.diag(information)[free] > 0]

@@ -29,7 +29,7 @@ class Search:
         best, kept = bare, [bare]
         for size in range(1, self.policy.most_terms + 1):
             promised = self._promised(kept, best)
-            most = len(self.trials.terms) if size == 1 else self.policy.tried
+            most = len(self.trials.terms) if size == 1 else self.policy.fitted_subsets
             order = sorted(promised, key=lambda n: promised[n][0])[:most]
             for k, names in enumerate(order):
                 if self.trials.clock.over:
@@ -40,8 +40,8 @@ class Search:
                 if self._settles(start, self.trials.attempt(names, start)):
                     break
             found = [t for n, t in self.trials.known.items() if len(n) == size]
-            enough = self.policy.hopeless * self.trials.least_cost
-            kept = sorted(found, key=_bic)[: self.policy.kept]
+            enough = self.policy.hopeless_cost * self.trials.least_cost
+            kept = sorted(found, key=_bic)[: self.policy.extended_subsets]
             kept = [self.trials.finished(t) if t.fit.cost < enough else t for t in kept]
             kept = sorted((t for t in kept if t.bic < best.bic), key=_bic)
             if not kept:
@@ -79,7 +79,7 @@ class Search:
         have reduced the cost substantially.
         """
         part = best.fit.cost / before.fit.cost
-        return self.trials.settled(best) or part < self.policy.helped
+        return self.trials.settled(best) or part < self.policy.helpful_cost
 
     def _settles(self, start: Trial, trial: Trial | None) -> bool:
         """Return whether a subset explains the data although the smaller one did not.
@@ -90,7 +90,7 @@ class Search:
         enough = self.policy.explained * self.trials.problem.samples
         if trial is None or not trial.fit.cost < enough < start.fit.cost:
             return False
-        for names in self._exchanges(trial, self.policy.leads):
+        for names in self._exchanges(trial, self.policy.lead_bic):
             self.trials.attempt(names, trial)
         return True
 
@@ -105,7 +105,7 @@ class Search:
         own = self._promises(best, self.trials.scan(best.names))
         for trial in kept:
             # if the best subset leaves only noise, only equally good ones are extended
-            if not own and trial.bic > best.bic + self.policy.leads:
+            if not own and trial.bic > best.bic + self.policy.lead_bic:
                 continue
             for names, bic in self._promises(
                 trial, self.trials.scan(best.names)
@@ -187,7 +187,7 @@ class Search:
                     found.append((change, (best.names - {out}) | {term.name}))
         # keep the most promising subsets; among equals, the first ones
         found.sort(key=lambda one: one[0])
-        return [names for _, names in found[: self.policy.tried]]
+        return [names for _, names in found[: self.policy.fitted_subsets]]
 
     def _promises(self, trial: Trial, scan: Periodogram) -> dict[frozenset[str], float]:
         """Return the subsets with one further term, each with its predicted BIC."""
@@ -200,7 +200,11 @@ class Search:
                 continue
             names = [one.name for one in term.strengths() if not one.inner]
             grown = added_gain(
-                information, score, free, blocks.rows(names), self.policy.alike
+                information,
+                score,
+                free,
+                blocks.rows(names),
+                self.policy.distinct_information,
             )
             if term.starts():
                 grown = self.trials.placed(trial.names, term).gain
@@ -224,9 +228,9 @@ class Search:
         explain most of the residual.
         """
         samples = self.trials.problem.samples
-        if trial.fit.cost < self.policy.near * samples:
+        if trial.fit.cost < self.policy.near_cost * samples:
             return 0.0
-        return (1 - self.policy.helped) * (trial.fit.cost - samples)
+        return (1 - self.policy.helpful_cost) * (trial.fit.cost - samples)
 
 
 def _bic(trial: Trial) -> float:

@@ -70,7 +70,7 @@ class Trials:
 
     def hopeless(self, cost: float) -> bool:
         """Return whether a fit with this cost is too far from the best to refine it."""
-        return cost > self.policy.hopeless * self.least_cost
+        return cost > self.policy.hopeless_cost * self.least_cost
 
     def term(self, name: str) -> Term:
         return next(term for term in self.terms if term.name == name)
@@ -166,7 +166,7 @@ class Trials:
         decides = -math.inf
         if names < start.names:
             threshold = sum(self.threshold(name) for name in start.names - names)
-            decides = start.fit.cost + self.policy.clear * threshold
+            decides = start.fit.cost + self.policy.clear_gain * threshold
         found = self._fit(free, first, iterations, beaten, decides)
         if self._sound(found) or self.hopeless(found.cost):
             return found
@@ -200,7 +200,7 @@ class Trials:
 
         It is valid at an optimum, and also elsewhere if the fit is near the data.
         """
-        close = trial.fit.cost < self.policy.near * self.problem.samples
+        close = trial.fit.cost < self.policy.near_cost * self.problem.samples
         return trial.fit.optimal or close
 
     def without(self, best: Trial, name: str) -> Trial:
@@ -279,7 +279,7 @@ class Trials:
         for name in self.rig:
             known = self.problem.parameter(name).prior_stderr
             nominal = start[self.problem.names.index(name)]
-            if abs(found[name].value - nominal) > self.policy.astray * known:
+            if abs(found[name].value - nominal) > self.policy.astray_shift * known:
                 return False
         return True
 
