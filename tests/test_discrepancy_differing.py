@@ -7,7 +7,7 @@ import pytest
 from swing_rig import Swing
 
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.evidence._choice import _fewest
+from jaxcam.discrepancy.evidence._choice import _fewest, _Separate
 from jaxcam.discrepancy.evidence._differing import differing
 from jaxcam.discrepancy.report._caveats import may_differ, Reason
 from jaxcam.discrepancy.search._roughness import Roughness
@@ -110,18 +110,20 @@ def _separate(bic, complete=True):
 def test_terms_that_hardly_improve_separate_values_are_dropped(unchecked_types):
     """The named terms have a BIC of 1000; a difference below 10 is a tie."""
     policy, alone = Policy(), _separate(905.0)
-    assert _fewest(_separate(900.0), alone, 1000.0, policy) is alone
+    assert _fewest(_Separate(_separate(900.0), alone, False), 1000.0, policy) is alone
     with_terms = _separate(890.0)
-    assert _fewest(with_terms, alone, 1000.0, policy) is with_terms
+    assert _fewest(_Separate(with_terms, alone, False), 1000.0, policy) is with_terms
 
 
 def test_separate_values_must_leave_noise_and_beat_the_terms(unchecked_types):
     policy = Policy()
-    assert _fewest(_separate(900.0, False), None, 1000.0, policy) is None
-    assert _fewest(_separate(1001.0), None, 1000.0, policy) is None
-    assert _fewest(None, None, 1000.0, policy) is None
+    assert (
+        _fewest(_Separate(_separate(900.0, False), None, False), 1000.0, policy) is None
+    )
+    assert _fewest(_Separate(_separate(1001.0), None, False), 1000.0, policy) is None
+    assert _fewest(_Separate(None, None, False), 1000.0, policy) is None
     only = _separate(950.0)
-    assert _fewest(_separate(1001.0), only, 1000.0, policy) is only
+    assert _fewest(_Separate(_separate(1001.0), only, False), 1000.0, policy) is only
 
 
 def test_values_that_tie_with_a_function_are_stated_with_the_next_recording():

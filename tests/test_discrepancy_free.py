@@ -211,7 +211,7 @@ def test_what_free_parameters_imitate_is_no_function():
 def test_only_forces_are_averaged_over_an_integration_step():
     """The velocity of a surface is a derivative: averaged, it would be another one."""
     found = families(
-        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
+        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), (0.0, 4.0),
         turned=True, gaps=(0, 1), slip=0.01, motion_unit="m",
         strides={Variable.TIME: 0.1, Variable.POSITION: 0.2},
     )  # fmt: skip
@@ -232,7 +232,7 @@ def test_a_table_has_several_points_in_a_jump():
 
 def test_families_have_one_place_each_and_different_names():
     both = families(
-        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
+        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), (0.0, 4.0),
         turned=True, gaps=(0, 1), slip=0.01, motion_unit="m", strides={},
     )  # fmt: skip
     names = [one.name for one in both]
@@ -247,7 +247,7 @@ def test_families_have_one_place_each_and_different_names():
         )
         assert first == second
     free = families(
-        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), 4.0,
+        (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), (0.0, 4.0),
         turned=False, gaps=(), slip=0.01, motion_unit="m", strides={},
     )  # fmt: skip
     assert {one.where for one in free} == {Where.FLIGHT, Where.SENSOR}

@@ -188,9 +188,9 @@ def _answered(
         rough = _roughly(question, bare, seed, report, keep, policy, clock)
     if rough is not None and not rough.choice.explained(policy):
         return diagnosis_of(case, *rough, ripple)
-    if rough is not None and rough.choice.best.names:
+    if rough is not None and rough.choice.named.best.names:
         # the physics was found, so that the stated noise can be used
-        again = _again(trials, rough.choice.best)
+        again = _again(trials, rough.choice.named.best)
         if again is not None and again.bic < best.bic:
             best = search.refined(again)
     choice = choose(question, trials, best, seed, unnamed=not odd)
@@ -218,7 +218,8 @@ class _Roughly(NamedTuple):
     @property
     def finds(self) -> bool:
         """Whether terms or functions were found."""
-        return bool(self.choice.best.names) or self.choice.missing is not None
+        named, unnamed = self.choice.named, self.choice.unnamed
+        return bool(named.best.names) or unnamed.found is not None
 
 
 def _roughly(

@@ -1,6 +1,6 @@
 """Assess a verdict: bootstrap, held-out data, residual structure, detection limits."""
 
-from ._choice import Choice as Choice, choose as choose, Outside as Outside
+from ._choice import Choice as Choice, choose as choose
 from ._differing import above_noise as above_noise, Differing as Differing
 from ._held_out import HeldOut as HeldOut, rms_of as rms_of
 from ._limits import Limit as Limit, limits as limits
@@ -16,6 +16,7 @@ from ._structure import (
     Form as Form,
     Structure as Structure,
 )
+from ._supported import Outside as Outside
 from ._visited_states import (
     visited_states as visited_states,
     VisitedStates as VisitedStates,

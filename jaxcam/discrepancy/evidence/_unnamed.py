@@ -1,6 +1,8 @@
 """Seek unnamed functions that explain the residual of the named terms."""
 
 import dataclasses
+import math
+from typing import NamedTuple
 
 from ..policy import Policy
 from ..search import decoys_of, FreeSearch, Missing, Question, Trial, Trials
@@ -12,9 +14,26 @@ from ._structure import Structure
 from ._visited_states import visited_states
 
 
+class Unnamed(NamedTuple):
+    """Unnamed functions, `None` if there are none, and the evidence for them.
+
+    `needs` are their bootstrap results, and `rivals` are other functions that were
+    fitted in their place.
+    """
+
+    found: Missing | None = None
+    needs: Needs | None = None
+    rivals: tuple[Rival, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """The BIC of the fit with the functions; infinite without functions."""
+        return math.inf if self.found is None else self.found.score
+
+
 def without_a_name(
     question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
-) -> tuple[Missing | None, Needs | None, tuple[Rival, ...]]:
+) -> Unnamed:
     """Return the functions that explain the residual of the named terms, chosen by
     their evidence.
 
@@ -27,7 +46,7 @@ def without_a_name(
     near = best.fit.cost < policy.near_cost * problem.samples
     small = policy.small if near else policy.corner_share
     if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
-        return None, None, ()
+        return Unnamed()
     visited = visited_states(problem)
     positions, velocities, approach, times = visited.ranges(policy)
     offered = families(
@@ -69,10 +88,10 @@ def without_a_name(
             results.append(searched(False, dataclasses.replace(policy, elements=0)))
     kept = [(one, its) for _, one, its in results if one is not None]
     if not kept:
-        return None, None, ()
+        return Unnamed()
     chosen, its_needs = min(kept, key=lambda each: each[0].score)
     tried = [one for search, _, _ in results for one in search.tried]
-    return chosen, its_needs, rivals(chosen, tried, policy, seed)
+    return Unnamed(chosen, its_needs, rivals(chosen, tried, policy, seed))
 
 
 def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:

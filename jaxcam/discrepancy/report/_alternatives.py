@@ -17,8 +17,8 @@ def fitted_alternatives(trials: Trials, choice: Choice) -> list[Trial]:
     the term that replaces a parameter outside its tolerance is not an explanation at
     all.
     """
-    best = choice.best
-    needed = {one.term for one in choice.beyond if one.term}
+    best = choice.named.best
+    needed = {one.term for one in choice.named.beyond if one.term}
     found = [
         trial
         for names, trial in trials.known.items()
@@ -33,7 +33,7 @@ def alternatives_of(trials: Trials, choice: Choice) -> tuple[Alternative, ...]:
     These are the other fitted subsets, and the chosen terms with each further term,
     even if its predicted gain was too small for a fit.
     """
-    best = choice.best
+    best = choice.named.best
     found = [
         Alternative(_name(trial), trial.bic - best.bic, _terms(trial), reason)
         for trial in fitted_alternatives(trials, choice)
@@ -92,11 +92,11 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
     """Yield the chosen terms with each further term added, and the gain of that
     term.
     """
-    best, price = choice.best, math.log(trials.problem.samples)
+    best, price = choice.named.best, math.log(trials.problem.samples)
     blocks = trials.blocks(best)
     information, score = blocks.total()
     free = blocks.rows(trials.parameters(best.names))
-    dropped = dict((*choice.doubtful, *choice.masked))
+    dropped = dict((*choice.named.doubtful, *choice.named.masked))
     for term in trials.terms:
         if term.name in best.names:
             continue
@@ -126,7 +126,7 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
 
 def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
     """Return the reason why a fitted subset is not the named one."""
-    best, samples = choice.best, trials.problem.samples
+    best, samples = choice.named.best, trials.problem.samples
     if not trials.settled(trial):
         return "its fit did not come close to the data"
     if abs(trial.bic - best.bic) < trials.policy.tie:

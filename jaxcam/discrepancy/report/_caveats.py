@@ -54,20 +54,22 @@ def caveats_of(
     **Arguments:** the trials, the choice, other subsets that are equally good, and
     whether any effect is named.
     """
-    for name, share in choice.doubtful:
+    for name, share in choice.named.doubtful:
         yield _in_doubt(trials, name, share)
-    for name, share in choice.masked:
+    for name, share in choice.named.masked:
         yield _masked(choice, name, share)
-    for name, share in choice.needed:
+    for name, share in choice.named.needed:
         yield _named_in_doubt(trials, name, share)
-    for outside in choice.beyond:
+    for outside in choice.named.beyond:
         yield _beyond(outside)
-    if not trials.settled(choice.found):
+    if not trials.settled(choice.named.found):
         yield _far(trials)
     for trial in ties:
-        yield _tie(choice.best, trial)
+        yield _tie(choice.named.best, trial)
     apart = [
-        s for s in choice.left_after if s.gain > s.threshold and s.predicted_gain <= 0
+        s
+        for s in choice.named.left_after
+        if s.gain > s.threshold and s.predicted_gain <= 0
     ]
     explained = choice.differing is not None and choice.differing.complete
     if apart and not explained:
@@ -200,13 +202,13 @@ def poor_prediction(held: HeldOut) -> Caveat:
 
 def small_remainder(choice: Choice, share: float) -> Caveat:
     """Return the caveat that a named effect leaves a small residual."""
-    first = choice.unexplained[0]
+    first = choice.named.left[0]
     return Caveat(
         Reason.SMALL_REMAINDER,
         f"A small discrepancy remains ({first.sentence}, {first.place}); it amounts to "
         f"{percent(share)} of the explained misfit. The form of the named effect may "
         "be slightly different.",
-        tuple(sorted(choice.best.names)),
+        tuple(sorted(choice.named.best.names)),
     )
 
 
@@ -277,7 +279,7 @@ def _masked(choice: Choice, name: str, share: float) -> Caveat:
     return Caveat(
         Reason.MASKED,
         f"A term for {spelled(name)} would explain only {share:.1g} of the misfit "
-        f"explained by {listed(sorted(choice.best.names))}; the smoothing of dry "
+        f"explained by {listed(sorted(choice.named.best.names))}; the smoothing of dry "
         "friction at zero velocity may leave this much unexplained.",
         (name,),
     )

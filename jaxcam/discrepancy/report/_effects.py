@@ -22,8 +22,8 @@ def term_effects(
 
     **Arguments:** `share`: the fraction of the misfit that each of them explains.
     """
-    best, blocks = choice.best, trials.blocks(choice.best)
-    instead = {one.term: one.lost for one in choice.beyond if one.term}
+    best, blocks = choice.named.best, trials.blocks(choice.named.best)
+    instead = {one.term: one.lost for one in choice.named.beyond if one.term}
     found = []
     for name in sorted(best.names):
         less = trials.known.get(best.names - {name}, choice.before)
@@ -36,10 +36,10 @@ def term_effects(
                 trials.term(name),
                 best.fit,
                 blocks,
-                choice.deviation,
+                choice.named.deviation,
                 delta,
                 choice.held.total,
-                choice.inclusion[name],
+                choice.named.inclusion[name],
                 trials.policy,
                 share[name],
             )
@@ -174,7 +174,7 @@ def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
     Args:
         share: The unexplained fraction of the misfit.
     """
-    first, problem = choice.unexplained[0], trials.problem
+    first, problem = choice.named.left[0], trials.problem
     return Effect(
         Verdict.UNKNOWN,
         first.sentence,

@@ -48,7 +48,7 @@ def summary_of(
         )
         parts.append(f"{effect.sentence} ({share}{values}; {effect.region})")
     if verdict is Verdict.EFFECT:
-        moved = _moved(choice.best, within, rig, policy)
+        moved = _moved(choice.named.best, within, rig, policy)
         return f"The model lacks {' and '.join(parts)}.{moved}"
     what = effects[0]
     acts = f"it acts like {what.sentence}, {what.region}."
@@ -116,7 +116,7 @@ def summary_of_functions(
 
 
 def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
-    fitted, unseen = rms_of(choice.best.fit), choice.held.after
+    fitted, unseen = rms_of(choice.named.best.fit), choice.held.after
     tail = ""
     for name, limit in least.items():
         size = quantity(f"{limit.size:.2g}", limit.unit)

@@ -57,10 +57,16 @@ def diagnosis_of(
     ripple: Ripple | None,
 ) -> Diagnosis:
     """Report the choice and its evidence in words and numbers."""
-    policy, held, best = trials.policy, choice.held, choice.best
-    if choice.missing is not None and choice.needs is not None:
+    policy, held, best = trials.policy, choice.held, choice.named.best
+    if choice.unnamed.found is not None and choice.unnamed.needs is not None:
         return _of_functions(
-            case, question, trials, choice, choice.missing, choice.needs, ripple
+            case,
+            question,
+            trials,
+            choice,
+            choice.unnamed.found,
+            choice.unnamed.needs,
+            ripple,
         )
     divided = _shares_of(trials, choice)
     effects = term_effects(trials, choice, divided.of)
@@ -88,12 +94,12 @@ def diagnosis_of(
         held.after * floor,
         floor,
         question.unit,
-        _rig_values(question, choice.best.fit, choice.deviation),
+        _rig_values(question, choice.named.best.fit, choice.named.deviation),
         summary_of(verdict, effects, choice, within, question.rig, least, policy),
         choice.before.fit,
         best.fit,
-        tuple(choice.left_before),
-        tuple(choice.left_after),
+        tuple(choice.named.left_before),
+        tuple(choice.named.left_after),
         held.residuals,
         ripple,
         _pulls(question, within, best.fit),
@@ -114,8 +120,8 @@ def _shares_of(trials: Trials, choice: Choice) -> Shares:
     """Return the fraction of the misfit that each named term explains, and the
     unexplained fraction.
     """
-    best, before = choice.best, choice.before
-    instead = {one.term: one.lost for one in choice.beyond if one.term}
+    best, before = choice.named.best, choice.before
+    instead = {one.term: one.lost for one in choice.named.beyond if one.term}
     lost = {
         name: instead.get(
             name,
@@ -123,7 +129,7 @@ def _shares_of(trials: Trials, choice: Choice) -> Shares:
         )
         for name in best.names
     }
-    left = max((one.gain for one in choice.unexplained), default=0.0)
+    left = max((one.gain for one in choice.named.left), default=0.0)
     return shares(before.fit, best.fit, lost, left, trials.policy)
 
 
@@ -142,7 +148,7 @@ def _of_functions(
     bare = choice.before
     close = close_forms(
         missing,
-        [rival.missing for rival in choice.rivals],
+        [rival.missing for rival in choice.unnamed.rivals],
         needs.lost,
         policy.small,
     )
@@ -158,7 +164,7 @@ def _of_functions(
         case,
         Verdict.UNKNOWN,
         tuple(effects),
-        alternatives_to_functions(trials, missing, choice.rivals),
+        alternatives_to_functions(trials, missing, choice.unnamed.rivals),
         held.before * floor,
         held.after * floor,
         floor,
@@ -169,7 +175,7 @@ def _of_functions(
         ),
         bare.fit,
         found,
-        tuple(choice.left_before),
+        tuple(choice.named.left_before),
         (),
         held.residuals,
         ripple,
@@ -199,7 +205,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     data, or explain no more than other functions do.
     """
     left, held = missing.fit, choice.held
-    for rival in choice.rivals:
+    for rival in choice.unnamed.rivals:
         if rival.share > 1 - policy.confidence:
             yield functions_tie(rival_name(rival), rival)
     share = max((share for _, share in missing.decoys), default=0.0)
@@ -221,11 +227,11 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
 
 def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
     """Return the verdict, and a caveat if a named effect leaves a small residual."""
-    if not choice.unexplained:
+    if not choice.named.left:
         return (Verdict.EFFECT if named else Verdict.NONE), []
-    left = max(one.gain for one in choice.unexplained)
-    explained = choice.before.fit.cost - choice.best.fit.cost
-    if choice.best.names and left < small * explained:
+    left = max(one.gain for one in choice.named.left)
+    explained = choice.before.fit.cost - choice.named.best.fit.cost
+    if choice.named.best.names and left < small * explained:
         return Verdict.EFFECT, [small_remainder(choice, left / explained)]
     return Verdict.UNKNOWN, []
 
