@@ -75,25 +75,35 @@ def test_the_choice_with_an_additional_term_is_no_rival(monkeypatch, unchecked_t
 
 
 @pytest.mark.parametrize(
-    ("functions", "named", "preferred"),
+    ("before", "functions", "named", "dropped"),
     [
         # the functions explain most of what is left: no other prediction is needed
-        (0.4, None, False),
+        (10.0, 4.0, None, False),
         # both are poor, and the named terms are better
-        (0.9, 0.6, True),
-        (0.9, 0.95, False),
+        (1.5, 1.2, 1.1, True),
+        (1.5, 1.2, 1.3, False),
+        # most of the squared residual above the noise remains
+        (10.0, 9.0, 9.5, True),
+        # the textbook model leaves only noise
+        (1.001, 1.001, 1.001, False),
     ],
 )
-def test_functions_must_not_predict_worse_than_named_terms(
-    functions, named, preferred, monkeypatch, unchecked_types
+def test_functions_must_predict_held_out_data(
+    before, functions, named, dropped, monkeypatch, unchecked_types
 ):
-    """Held-out rms relative to that of the textbook model."""
+    """Held-out rms residuals of 10 000 samples, in units of the noise."""
     of_terms = SimpleNamespace(after=named)
     monkeypatch.setattr(_unnamed, "held_out", lambda trials, before, best: of_terms)
     trials = SimpleNamespace(policy=Policy())
-    held = SimpleNamespace(before=1.0, after=functions)
+    problem = SimpleNamespace(samples=10_000)
+    missing = SimpleNamespace(fit=SimpleNamespace(problem=problem))
+    held = SimpleNamespace(before=before, after=functions)
     best = SimpleNamespace(names=frozenset({"quadratic_drag"}))
-    found = _unnamed.rather_named(trials, None, best, held)
-    assert (found is of_terms) == preferred
+    found = _unnamed.rejected(trials, missing, held, None, best)
+    assert (found is not None) == dropped
+    if found is not None:
+        assert found.named is of_terms and found.functions is missing
+    # without named terms, only what the functions themselves predict counts
     best.names = frozenset()
-    assert _unnamed.rather_named(trials, None, best, held) is None
+    found = _unnamed.rejected(trials, missing, held, None, best)
+    assert (found is not None) == (before == 10.0 and dropped)

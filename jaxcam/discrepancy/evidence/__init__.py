@@ -17,6 +17,7 @@ from ._structure import (
     Structure as Structure,
 )
 from ._supported import Outside as Outside
+from ._unnamed import Rejected as Rejected
 from ._visited_states import (
     visited_states as visited_states,
     VisitedStates as VisitedStates,

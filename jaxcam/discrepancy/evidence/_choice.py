@@ -10,7 +10,7 @@ from ._differing import Differing, differing
 from ._held_out import held_out, HeldOut
 from ._structure import Structure
 from ._supported import bounded, Supported, supported
-from ._unnamed import rather_named, trial_of, Unnamed, without_a_name
+from ._unnamed import Rejected, rejected, trial_of, Unnamed, without_a_name
 from ._whole_flights import WholeFlights
 
 
@@ -18,7 +18,8 @@ from ._whole_flights import WholeFlights
 class Choice:
     """The result of a search and the evidence for it.
 
-    - `named`: the named terms; `unnamed`: functions that explain more than these.
+    - `named`: the named terms; `unnamed`: functions that explain more than these;
+        `rejected`: such functions that do not predict held-out data.
     - `before`: the fit without terms, with the rig parameters held within their
         tolerances.
     - `held`: the prediction of held-out data.
@@ -31,6 +32,7 @@ class Choice:
 
     named: Supported
     unnamed: Unnamed
+    rejected: Rejected | None
     before: Trial
     held: HeldOut
     differing: Differing | None
@@ -76,23 +78,24 @@ def choose(
         if fewest is not None and fewest is separate.instead:
             # the terms only imitated the differences
             different, named = fewest, named.textbook(trials, textbook, seed)
-    best = named.best
+    best, useless = named.best, None
     before, held = _within(trials, textbook, best.fit), named.held
     missing = functions.found
     if missing is not None:
         bare = _within(trials, textbook, missing.fit)
         by_functions = held_out(trials, bare, trial_of(missing))
-        held = rather_named(trials, before, best, by_functions)
-        if held is None:
+        useless = rejected(trials, missing, by_functions, before, best)
+        if useless is None:
             before, held = bare, by_functions
             different = differing(missing.fit, policy)
         else:
-            functions = Unnamed()
+            functions, held = Unnamed(), useless.named
     return Choice(
         named=named,
         before=before,
         held=held or held_out(trials, before, best),
         unnamed=functions,
+        rejected=useless,
         differing=different,
         tied=None if functions.found is None else fewest,
     )

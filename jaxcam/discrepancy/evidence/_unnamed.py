@@ -135,20 +135,43 @@ def trial_of(missing: Missing) -> Trial:
     return Trial(names, missing.fit, missing.score, 0, False)
 
 
-def rather_named(
-    trials: Trials, before: Trial, best: Trial, held: HeldOut
-) -> HeldOut | None:
-    """Return the prediction of held-out data by the named terms, if it is better than
-    that by functions.
+class Rejected(NamedTuple):
+    """Functions that explain the recordings but predict held-out data no better than
+    the `named` terms do, or hardly better than the textbook model.
+    """
+
+    functions: Missing
+    held: HeldOut
+    named: HeldOut
+
+
+def rejected(
+    trials: Trials, found: Missing, held: HeldOut, before: Trial, best: Trial
+) -> Rejected | None:
+    """Return functions that do not predict held-out data, or `None` if they do.
 
     Functions of the time, or of a state visited only once, may explain the recordings
-    and yet predict nothing. The prediction by named terms is computed only if that by
-    functions is hardly better than that of the textbook model.
+    and yet predict nothing.
 
-    **Arguments:** the fits without and with the named terms; the prediction by the
-    functions.
+    **Arguments:** the functions and their prediction of held-out data; the fits without
+    and with the named terms, whose prediction is computed only if that by functions is
+    hardly better than that of the textbook model.
     """
-    if not best.names or held.after < trials.policy.explains * held.before:
+    policy = trials.policy
+    useless = not _predictive(held, found.fit.problem.samples, policy)
+    better = held.after < policy.explains * held.before or not best.names
+    if better and not useless:
         return None
     named = held_out(trials, before, best)
-    return named if named.after < held.after else None
+    if useless or named.after < held.after:
+        return Rejected(found, held, named)
+    return None
+
+
+def _predictive(held: HeldOut, samples: int, policy: Policy) -> bool:
+    """Return whether functions explain enough of the squared residual on held-out data
+    above the noise, if there is any.
+    """
+    before, after = held.before**2 - 1, held.after**2 - 1
+    certain = before > policy.cost_errors * math.sqrt(2 / samples)
+    return not certain or after < policy.explains * before

@@ -4,7 +4,7 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, Differing, HeldOut, Outside, Rival, rms_of
+from ..evidence import Choice, Differing, HeldOut, Outside, Rejected, Rival, rms_of
 from ..policy import Policy
 from ..search import Question, Trial, Trials
 from ._words import listed, number, percent, quantity, ratio, spelled
@@ -23,6 +23,7 @@ class Reason(enum.StrEnum):
     NOT_SHARED = "not shared by the records"
     DIFFERING = "a parameter differs"
     POOR_PREDICTION = "poor prediction"
+    NOT_PREDICTIVE = "functions that do not predict"
     ABOVE_NOISE = "above the noise"
     BEYOND_TOLERANCE = "beyond tolerance"
     NOISIER = "noisier than stated"
@@ -123,6 +124,20 @@ def _values_of(found: Differing, policy: Policy) -> str:
     return ", ".join(
         f"{name} {number(value, stderr, unit)}"
         for name, value, stderr in zip(found.records, values, found.stderr)
+    )
+
+
+def not_predictive(found: Rejected, functions: str) -> Caveat:
+    """Return the caveat that functions explain the recordings only where they were
+    fitted.
+    """
+    held = found.held
+    return Caveat(
+        Reason.NOT_PREDICTIVE,
+        f"A {functions} fits the recordings but does not predict held-out flights: the "
+        f"residual there is {ratio(held.after)} times the noise, compared with "
+        f"{ratio(found.named.after)} times without it. It is therefore not reported. "
+        "Record more motions under the same conditions.",
     )
 
 

@@ -34,6 +34,7 @@ from ._caveats import (
     may_differ,
     model_errors,
     noisier_than_stated,
+    not_predictive,
     out_of_time,
     small_remainder,
 )
@@ -197,6 +198,10 @@ def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[C
     """Return caveats on the conditions of the search, whatever it found."""
     yield from noisier_than_stated(question)
     yield from model_errors(question, choice)
+    if choice.rejected is not None:
+        found = choice.rejected.functions
+        parts = [named_function(found.fit, part) for part in found.functions]
+        yield not_predictive(choice.rejected, " and a ".join(parts))
     yield from out_of_time(trials)
 
 
