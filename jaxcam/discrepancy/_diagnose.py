@@ -85,44 +85,40 @@ def diagnose(
     """
     if isinstance(candidates, str) and candidates != "extended":
         raise ValueError(f'`candidates` is "{candidates}"; give terms, or "extended".')
-    report = progress or (lambda sentence, fraction: None)
+    conditions = _Conditions(
+        case,
+        seed,
+        progress or (lambda sentence, fraction: None),
+        policy,
+        Clock(policy.minutes),
+    )
+    rig = _Rig(system, candidates, sensors, parameters, drive)
     make_room()
-    clock = Clock(policy.minutes)
 
     def asked(
         runs: Sequence[Recording | Segments],
         folder: Path | None,
         location: Location = Location(),
     ) -> Diagnosis:
-        question = _question(
-            system,
-            runs,
-            candidates,
-            sensors,
-            parameters,
-            drive,
-            report,
-            policy,
-            location,
-        )
-        return _answered(question, case, seed, report, folder, policy, clock)
+        question = rig.question(runs, location, conditions)
+        return _answered(question, folder, conditions)
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
-        report(f"searching at {kind} {location[k] + 1}", None)
+        conditions.report(f"searching at {kind} {location[k] + 1}", None)
         name = "at_{}_{}".format(*location)
         return asked(recordings, None if keep is None else keep / name, location)
 
     found = asked(recordings, keep)
     odd = odd_record(found.after, policy)
     if odd is not None:
-        report(f"repeating the diagnosis without {odd}", None)
+        conditions.report(f"repeating the diagnosis without {odd}", None)
         others = [run for run in recordings if _name_of(run) != odd]
         folder = None if keep is None else keep / "without_one"
         found = set_aside(found, asked(others, folder), odd)
     elif falls_short(found):
         found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
-    if keep is not None and not clock.stopped:
+    if keep is not None and not conditions.clock.stopped:
         # with more time, an interrupted search may continue from its fits
         shutil.rmtree(keep, ignore_errors=True)
     return found
@@ -132,52 +128,69 @@ def _name_of(run: Recording | Segments) -> str:
     return run.recording.name if isinstance(run, Segments) else run.name
 
 
-def _question(
-    system,
-    recordings,
-    candidates,
-    sensors,
-    parameters,
-    drive,
-    report,
-    policy,
-    location: Location,
-) -> Question:
-    """Return the question to be answered for a rig, a setup or a bare system."""
-    if isinstance(system, Rig):
-        return rig_question(system, recordings, candidates, report, policy)
-    if isinstance(system, Setup):
-        return setup_question(system, recordings, candidates, report, policy, location)
-    return system_question(
-        system,
-        tuple(recordings),
-        candidates,
-        sensors,
-        parameters,
-        drive,
-        report,
-        policy,
-        location=location,
-    )
+class _Conditions(NamedTuple):
+    """What all searches of a diagnosis have in common."""
+
+    case: str
+    seed: int
+    report: Report
+    policy: Policy
+    clock: Clock
+
+    def trials(self, question: Question, keep: Path | None) -> Trials:
+        """Return the fits of a question; those in a folder are kept."""
+        problem, rig, terms = question.problem, question.rig, question.terms
+        kept = None if keep is None else KeptTrials(keep, problem, self.policy)
+        return Trials(problem, rig, terms, self.policy, self.report, kept, self.clock)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Rig:
+    """A rig, a setup or a bare system, with the terms that may be named."""
+
+    system: HybridSystem | Rig | Setup
+    candidates: Candidates
+    # of a bare system
+    sensors: Mapping[str, Sensor] | None
+    parameters: Sequence[Parameter]
+    drive: Turning | Input | None
+
+    def question(
+        self,
+        recordings: Sequence[Recording | Segments],
+        location: Location,
+        conditions: _Conditions,
+    ) -> Question:
+        """Return the question to be answered from recordings."""
+        system, asked = self.system, (conditions.report, conditions.policy)
+        if isinstance(system, Rig):
+            return rig_question(system, recordings, self.candidates, *asked)
+        if isinstance(system, Setup):
+            return setup_question(system, recordings, self.candidates, *asked, location)
+        return system_question(
+            system,
+            tuple(recordings),  # pyright: ignore
+            self.candidates,
+            self.sensors,
+            self.parameters,
+            self.drive,
+            *asked,
+            location=location,
+        )
 
 
 def _answered(
-    question: Question,
-    case: str,
-    seed: int,
-    report: Report,
-    keep: Path | None,
-    policy: Policy,
-    clock: Clock,
+    question: Question, keep: Path | None, conditions: _Conditions
 ) -> Diagnosis:
     """Search for terms, test the result, and return the diagnosis."""
+    case, seed, report, policy, _ = conditions
     ripple = None
     if question.drives:
         report("examining the speed of the drive", None)
         ripple = ripple_of(
             question.drives, question.drive_noise, question.drive_channel, policy
         )
-    trials = _trials(question, report, keep, policy, clock)
+    trials = conditions.trials(question, keep)
     search = Search(trials)
     best = search.run()
     bare, rough = trials.known[frozenset()], None
@@ -185,7 +198,7 @@ def _answered(
     # an odd recording is no missing physics: the diagnosis is repeated without it
     odd = odd_record(best.fit, policy) is not None
     if far and not odd:
-        rough = _roughly(question, bare, seed, report, keep, policy, clock)
+        rough = _roughly(question, bare, keep, conditions)
     if rough is not None and not rough.choice.explained(policy):
         return diagnosis_of(case, *rough, ripple)
     if rough is not None and rough.choice.named.best.names:
@@ -223,13 +236,7 @@ class _Roughly(NamedTuple):
 
 
 def _roughly(
-    question: Question,
-    bare: Trial,
-    seed: int,
-    report: Report,
-    keep: Path | None,
-    policy: Policy,
-    clock: Clock,
+    question: Question, bare: Trial, keep: Path | None, conditions: _Conditions
 ) -> _Roughly | None:
     """Choose terms with joints and noise that allow for errors of the model.
 
@@ -237,21 +244,14 @@ def _roughly(
 
     **Returns:** `None` if single pieces of flight hardly show the errors.
     """
+    _, seed, report, policy, _ = conditions
     report("allowing for model errors", None)
-    folder = None if keep is None else keep / "with_model_error"
     rough = with_model_error(question, policy)
     if rough is None:
         return None
-    trials = _trials(rough, report, folder, policy, clock)
+    folder = None if keep is None else keep / "with_model_error"
+    trials = conditions.trials(rough, folder)
     choice = choose(rough, trials, Search(trials).run(), seed)
     report("fitting complete flights", None)
     whole = whole_flights(bare.fit, choice.fit, rough.looseness, policy)
     return _Roughly(rough, trials, dataclasses.replace(choice, whole=whole))
-
-
-def _trials(
-    question: Question, report: Report, keep: Path | None, policy: Policy, clock: Clock
-) -> Trials:
-    kept = None if keep is None else KeptTrials(keep, question.problem, policy)
-    problem, rig, terms = question.problem, question.rig, question.terms
-    return Trials(problem, rig, terms, policy, report, kept, clock)
