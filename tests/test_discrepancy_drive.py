@@ -51,7 +51,7 @@ def test_wandering_is_no_ripple():
 
 
 def test_a_ripple_that_half_of_the_redrawn_sets_lack_is_none():
-    """As any other term, it must be kept by `Policy.sure` of them."""
+    """As any other term, it must be kept by `Policy.confidence` of them."""
     policy = Policy()
     known = dict.fromkeys(
         ("eps", "eps_stderr", "psi", "psi_stderr", "p_value", "dispersion"), 1e-6

@@ -152,7 +152,7 @@ def test_the_gain_is_the_marginal_likelihood():
     direct = data @ data / 0.01 - data @ np.linalg.solve(covariance, data)
     direct -= np.linalg.slogdet(covariance)[1] - 300 * math.log(0.01)
     assert found.gain == pytest.approx(direct, rel=1e-8)
-    price = occam(information, none, own[:-1], spread, POLICY.alike)
+    price = occam(information, none, own[:-1], spread, POLICY.distinct_information)
     assert price == pytest.approx(np.linalg.slogdet(covariance / 0.01)[1], rel=1e-8)
     # a smooth function is not taken for a rough one, nor for a small one
     assert found.length >= 0.1
@@ -183,9 +183,9 @@ def test_information_that_rounding_has_made_negative_counts_as_none():
     own, none = np.arange(SINES + 1), np.zeros(0, dtype=int)
     spread = np.sqrt(family.variances(SINES, 0.3))
     information = np.diag([*np.linspace(5.0, 1.0, SINES), 1.0])
-    seen = occam(information, none, own[1:-1], spread[1:], POLICY.alike)
+    seen = occam(information, none, own[1:-1], spread[1:], POLICY.distinct_information)
     information[0, 0] = -1e-12
-    price = occam(information, none, own[:-1], spread, POLICY.alike)
+    price = occam(information, none, own[:-1], spread, POLICY.distinct_information)
     assert price == pytest.approx(seen, rel=1e-12)
     zero = np.zeros(SINES + 1)
     gain = roughness(information, zero, none, own, family, zero, POLICY).gain

@@ -220,7 +220,7 @@ def test_a_system_with_terms_flies_as_before():
 def test_what_the_free_ones_imitate_gains_nothing():
     information = np.array([[4.0, 4.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
     score = np.array([2.0, 2.0, 3.0])
-    alike = _POLICY.alike
+    alike = _POLICY.distinct_information
     assert added_gain(information, score, np.array([0]), np.array([1]), alike) == 0.0
     both = added_gain(information, score, np.array([0]), np.array([1, 2]), alike)
     assert both == pytest.approx(9.0)

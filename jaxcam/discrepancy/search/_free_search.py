@@ -18,7 +18,6 @@ from ._clock import Clock
 from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
 from ._free_fits import FreeFits, heat_of, Missing, Subset
-from ._gains import added_gain, gain
 from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
 from ._hidden_signals import driven_by
@@ -26,12 +25,7 @@ from ._hidden_state import started
 from ._leads import Lead, Leads, shows_apart
 from ._left_out import LeftOut
 from ._recentre import recentred
-from ._slots import (
-    emptied,
-    Free,
-    Part,
-    roomy,
-)
+from ._slots import emptied, Free, roomy
 
 
 class FreeSearch:
@@ -314,7 +308,8 @@ class FreeSearch:
         """
         for out in (*found.functions, *sorted(found.names)):
             rest, point = self.left_out.subset(found, out)
-            rival = self._rival(found, out)
+            most = self.policy.lead_bic * heat_of(found.fit) + self._small(found)
+            rival = self.left_out.replacement(found, out, most)
             if rival is None:
                 continue
             self.progress(f"fitting {rival.replace('_', ' ')}", None)
@@ -325,28 +320,6 @@ class FreeSearch:
             if trial.score < found.score:
                 return self._swapped(trial)
         return found
-
-    def _rival(self, found: Missing, out: Part | str) -> str | None:
-        """Return the name of the term that best replaces a function or term; `None` if
-        no term is good enough, according to the quadratic likelihood about the fit.
-        """
-        names = [t.name for t in self.terms if t.name not in found.names]
-        strengths = {t: [s.name for s in self._term(t).strengths()] for t in names}
-        every = [name for own in strengths.values() for name in own]
-        left_out = self.left_out.quadratic(found, out, every)
-        quadratic = left_out.information, left_out.score, left_out.kept
-        gains = {
-            t: added_gain(
-                *quadratic, left_out.blocks.rows(own), self.policy.distinct_information
-            )
-            for t, own in strengths.items()
-        }
-        if not gains:
-            return None
-        name = max(gains, key=lambda one: gains[one])
-        left = left_out.worse - gain(*quadratic) - gains[name]
-        allowed = self.policy.lead_bic * heat_of(found.fit)
-        return name if left < allowed + self._small(found) else None
 
     def without(self, found: Missing, label: str) -> Missing:
         """Return the fit without the function or term that has the given label."""

@@ -11,7 +11,7 @@ from ..policy import Policy
 from ..terms import Term
 from ._blocks import Blocks, blocks_of, values_of
 from ._free_fits import FreeFits, Missing, Subset
-from ._gains import gain
+from ._gains import added_gain, gain
 from ._slots import emptied, filled, Part
 
 
@@ -81,6 +81,28 @@ class LeftOut:
         worse = float(step @ information @ step - 2 * step @ score)
         moved = score - information @ step
         return Without(worse, blocks, information, moved, blocks.rows(kept))
+
+    def replacement(self, found: Missing, out: Part | str, most: float) -> str | None:
+        """Return the name of the term that best replaces a function or term, according
+        to the quadratic likelihood about the fit.
+
+        **Arguments:** `most`: the largest increase in cost with the replacement; `None`
+        is returned if every term would increase it more.
+        """
+        offered = {t: own for t, own in self.strengths.items() if t not in found.names}
+        if not offered:
+            return None
+        every = [name for own in offered.values() for name in own]
+        least = self.policy.distinct_information
+        without = self.quadratic(found, out, every)
+        quadratic = without.information, without.score, without.kept
+        gains = {
+            term: added_gain(*quadratic, without.blocks.rows(own), least)
+            for term, own in offered.items()
+        }
+        best = max(gains, key=lambda one: gains[one])
+        left = without.worse - gain(*quadratic) - gains[best]
+        return best if left < most else None
 
     def pruned(self, found: Missing, allowed: Callable[[Missing], float]) -> Missing:
         """Return the fit without the functions and terms that are not needed.
