@@ -51,29 +51,29 @@ def _diagnosis(verdict, effects):
     )
     parts = [_residuals("run1"), _residuals("run2")]
     return Diagnosis(
-        "case",
-        Verdict(verdict),
-        effects,
-        (
+        case="case",
+        verdict=Verdict(verdict),
+        effects=effects,
+        alternatives=(
             Alternative("coulomb_friction", 55.0, ("coulomb_friction",)),
             Alternative("none", 2000.0, ()),
         ),
-        2e-4,
-        1e-4,
-        1e-4,
-        "rad",
-        {"K/J": Value(2400.0, 20.0, "1/(m^2 s^2)")},
-        "The model lacks damping. Without it <nothing> fits.",
-        None,  # pyright: ignore
-        None,  # pyright: ignore
-        (shape,),
-        (shape,),
-        (parts, parts),
-        None,
-        {"stiffness": (1.3, 0.2)},
-        {"fc": Value(0.01, 0.003, "rad/s^2")},
-        {"fc": "restitution"},
-        (Caveat(Reason.TIE, "One caveat."),),
+        heldout_before=2e-4,
+        heldout_after=1e-4,
+        noise_floor=1e-4,
+        unit="rad",
+        rig={"K/J": Value(2400.0, 20.0, "1/(m^2 s^2)")},
+        summary="The model lacks damping. Without it <nothing> fits.",
+        before=None,  # pyright: ignore
+        after=None,  # pyright: ignore
+        left_before=(shape,),
+        left_after=(shape,),
+        unseen=(parts, parts),
+        ripple=None,
+        pulls={"stiffness": (1.3, 0.2)},
+        limits={"fc": Value(0.01, 0.003, "rad/s^2")},
+        hides={"fc": "restitution"},
+        caveats=(Caveat(Reason.TIE, "One caveat."),),
     )
 
 
@@ -100,15 +100,15 @@ FUNCTIONS = (
     ),
 )
 EFFECT = Effect(
-    "viscous_damping",
-    "damping",
-    {"c1": Value(0.1, 0.01, "1/s")},
-    "flight",
-    "in flight",
-    ("run1",),
-    -100.0,
-    40.0,
-    1.0,
+    name="viscous_damping",
+    sentence="damping",
+    parameters={"c1": Value(0.1, 0.01, "1/s")},
+    where="flight",
+    region="in flight",
+    records=("run1",),
+    delta_bic=-100.0,
+    heldout_gain_nats=40.0,
+    inclusion=1.0,
 )
 
 

@@ -74,8 +74,10 @@ def test_a_branch_prints_its_ends_and_special_points():
 
 def test_a_diagnosis_prints_its_effects():
     drag = Effect(
-        "air_drag", "air", {"c": Value(0.12, 0.01, "1/m")}, "flight", "fast", ("a",),
-        -250.0, 120.0, 1.0,
+        name="air_drag", sentence="air",
+        parameters={"c": Value(0.12, 0.01, "1/m")},
+        where="flight", region="fast", records=("a",),
+        delta_bic=-250.0, heldout_gain_nats=120.0, inclusion=1.0,
     )  # fmt: skip
     fields = SimpleNamespace(case="swing", summary="Air drags.", effects=(drag,))
     text = Diagnosis._table(fields).text()  # pyright: ignore

@@ -99,20 +99,20 @@ def ripple_of(
     eps = abs(mean)
     psi = float(np.angle(mean)) % (2 * math.pi)
     return Ripple(
-        float(eps),
-        stderr,
-        psi,
-        stderr / max(eps, _TINY),
-        gain,
-        float(chi2.sf(gain, 2)),
-        samples,
-        dispersion,
-        {
+        eps=float(eps),
+        eps_stderr=stderr,
+        psi=psi,
+        psi_stderr=stderr / max(eps, _TINY),
+        gain=gain,
+        p_value=float(chi2.sf(gain, 2)),
+        count=samples,
+        dispersion=dispersion,
+        per_record={
             r.name: (float(abs(w)), float(math.sqrt(v)))
             for r, w, v in zip(recordings, wave[:, 0], variance)
         },
-        _held_out(wave[:, 0], variance),
-        _inclusion(
+        heldout_gain=_held_out(wave[:, 0], variance),
+        inclusion=_inclusion(
             wave[:, 0], variance, 2 * math.log(max(samples, 2)), policy.bootstrap
         ),
     )

@@ -65,15 +65,15 @@ def missing_effects(
         for record in _seen_in(blocks, fitted, coefficients(fitted, one.slot), policy)
     ]
     whole = Effect(
-        Verdict.UNKNOWN,
-        sentence_of(functions),
-        {},
-        missing.functions[0].where,
-        "; ".join(one.words for one in functions),
-        tuple(dict.fromkeys(seen)),
-        missing.score - choice.before.bic,
-        held,
-        min(needs.inclusion[label] for label in labels),
+        name=Verdict.UNKNOWN,
+        sentence=sentence_of(functions),
+        parameters={},
+        where=missing.functions[0].where,
+        region="; ".join(one.words for one in functions),
+        records=tuple(dict.fromkeys(seen)),
+        delta_bic=missing.score - choice.before.bic,
+        heldout_gain_nats=held,
+        inclusion=min(needs.inclusion[label] for label in labels),
         term=False,
         share=sum(divided.of[label] for label in labels),
     )
@@ -119,15 +119,15 @@ def _of_term(
         for one in strengths
     }
     return Effect(
-        term.name,
-        term.sentence,
-        term.reported(parameters),
-        term.where,
-        term.region,
-        _seen_in(blocks, found, [one.name for one in strengths], policy),
-        delta_bic,
-        gained,
-        inclusion,
+        name=term.name,
+        sentence=term.sentence,
+        parameters=term.reported(parameters),
+        where=term.where,
+        region=term.region,
+        records=_seen_in(blocks, found, [one.name for one in strengths], policy),
+        delta_bic=delta_bic,
+        heldout_gain_nats=gained,
+        inclusion=inclusion,
         share=share,
     )
 
@@ -153,18 +153,18 @@ def drive_effect(ripple: Ripple, policy: Policy) -> Effect:
         if eps > policy.ripple_errors * error
     )
     return Effect(
-        term.name,
-        term.sentence,
-        {
+        name=term.name,
+        sentence=term.sentence,
+        parameters={
             "eps": Value(ripple.eps, ripple.eps_stderr, "-"),
             "psi": Value(ripple.psi, ripple.psi_stderr, "rad"),
         },
-        term.where,
-        term.region,
-        seen,
-        ripple.delta_bic,
-        ripple.heldout_gain,
-        ripple.inclusion,
+        where=term.where,
+        region=term.region,
+        records=seen,
+        delta_bic=ripple.delta_bic,
+        heldout_gain_nats=ripple.heldout_gain,
+        inclusion=ripple.inclusion,
     )
 
 
@@ -176,15 +176,15 @@ def unknown_effect(trials: Trials, choice: Choice, share: float) -> Effect:
     """
     first, problem = choice.named.left[0], trials.problem
     return Effect(
-        Verdict.UNKNOWN,
-        first.sentence,
-        {},
-        first.where,
-        first.place,
-        problem.records,
-        -first.gain + first.count * math.log(problem.samples),
-        choice.held.total,
-        None,
+        name=Verdict.UNKNOWN,
+        sentence=first.sentence,
+        parameters={},
+        where=first.where,
+        region=first.place,
+        records=problem.records,
+        delta_bic=-first.gain + first.count * math.log(problem.samples),
+        heldout_gain_nats=choice.held.total,
+        inclusion=None,
         term=False,
         share=share,
     )

@@ -87,31 +87,33 @@ def diagnosis_of(
     within = choice.before.fit
     names = [effect.name for effect in effects]
     return Diagnosis(
-        case,
-        verdict,
-        tuple(effects),
-        alternatives_of(trials, choice),
-        held.before * floor,
-        held.after * floor,
-        floor,
-        question.unit,
-        _rig_values(question, choice.named.best.fit, choice.named.deviation),
-        summary_of(verdict, effects, choice, within, question.rig, least, policy),
-        choice.before.fit,
-        best.fit,
-        tuple(choice.named.left_before),
-        tuple(choice.named.left_after),
-        held.residuals,
-        ripple,
-        _pulls(question, within, best.fit),
-        {
+        case=case,
+        verdict=verdict,
+        effects=tuple(effects),
+        alternatives=alternatives_of(trials, choice),
+        heldout_before=held.before * floor,
+        heldout_after=held.after * floor,
+        noise_floor=floor,
+        unit=question.unit,
+        rig=_rig_values(question, choice.named.best.fit, choice.named.deviation),
+        summary=summary_of(
+            verdict, effects, choice, within, question.rig, least, policy
+        ),
+        before=choice.before.fit,
+        after=best.fit,
+        left_before=tuple(choice.named.left_before),
+        left_after=tuple(choice.named.left_after),
+        unseen=held.residuals,
+        ripple=ripple,
+        pulls=_pulls(question, within, best.fit),
+        limits={
             name: Value(one.size, one.stderr, one.unit)
             for name, one in least.items()
             if name not in names
         },
-        {name: one.hidden for name, one in least.items()},
-        tuple(caveats),
-        policy,
+        hides={name: one.hidden for name, one in least.items()},
+        caveats=tuple(caveats),
+        policy=policy,
         misfit=misfit_by_part(choice.before.fit, policy),
         differing=choice.differing,
     )
@@ -162,35 +164,35 @@ def _of_functions(
     floor = float(model.sensors[watching(model)].floor)
     within = bare.fit
     return Diagnosis(
-        case,
-        Verdict.UNKNOWN,
-        tuple(effects),
-        alternatives_to_functions(trials, missing, choice.unnamed.rivals),
-        held.before * floor,
-        held.after * floor,
-        floor,
-        question.unit,
-        _rig_values(question, found, needs.deviation),
-        summary_of_functions(
+        case=case,
+        verdict=Verdict.UNKNOWN,
+        effects=tuple(effects),
+        alternatives=alternatives_to_functions(trials, missing, choice.unnamed.rivals),
+        heldout_before=held.before * floor,
+        heldout_after=held.after * floor,
+        noise_floor=floor,
+        unit=question.unit,
+        rig=_rig_values(question, found, needs.deviation),
+        summary=summary_of_functions(
             functions, effects, held, rms_of(found), floor, question.unit
         ),
-        bare.fit,
-        found,
-        tuple(choice.named.left_before),
-        (),
-        held.residuals,
-        ripple,
-        _pulls(question, within, found),
-        {},
-        {},
-        (
+        before=bare.fit,
+        after=found,
+        left_before=tuple(choice.named.left_before),
+        left_after=(),
+        unseen=held.residuals,
+        ripple=ripple,
+        pulls=_pulls(question, within, found),
+        limits={},
+        hides={},
+        caveats=(
             *_of_search(question, trials, choice),
             *_doubts_of(choice, missing, policy),
         ),
-        policy,
-        functions,
-        misfit_by_part(bare.fit, policy),
-        choice.differing,
+        policy=policy,
+        missing=functions,
+        misfit=misfit_by_part(bare.fit, policy),
+        differing=choice.differing,
     )
 
 

@@ -171,7 +171,7 @@ def _fitted(
     values = replaced(values, columns, numbers)
     point = found.fit.point._replace(values=values)
     beaten = max(fits.policy.form_cost * found.fit.cost, found.fit.cost + small)
-    if shows_apart(one.family):
+    if apart is not problem and shows_apart(one.family):
         # with disconnected pieces, the fit is an almost linear problem
         subset = Subset(apart, functions, found.names)
         first = fits.fitted(subset, point, beaten=beaten)

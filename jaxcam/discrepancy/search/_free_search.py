@@ -71,11 +71,12 @@ class FreeSearch:
         faults = own_faults(self.problem.model, self.problem.parameters)
         self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
-        # far from the data, the predicted gains of elements are not reliable
-        self.roughly = roughly
-        self.apart = dataclasses.replace(
-            self.problem, extras=separated(self.problem.extras)
-        )
+        # far from the data, the predicted gains of elements are not reliable, and the
+        # pieces are hardly connected anyway
+        self.roughly, self.apart = roughly, self.problem
+        if not roughly:
+            extras = separated(self.problem.extras)
+            self.apart = dataclasses.replace(self.problem, extras=extras)
 
     def run(self) -> Missing | None:
         """Return the functions and terms found, or `None` if none is significant.
@@ -275,7 +276,7 @@ class FreeSearch:
 
     def _with(self, problem: Problem, found: Missing, lead: Lead) -> Missing | None:
         functions, names = found.functions, found.names
-        point = found.fit.point
+        point, trial = found.fit.point, None
         if lead.promise is not None:
             hidden, direct = lead.promise.hidden, lead.promise.direct
             functions = (*functions, hidden)
@@ -291,14 +292,14 @@ class FreeSearch:
             names = names | {lead.name}
         if self._shows_apart(lead):
             # a force is almost linear if impacts do not connect the pieces
-            first = self.fits.fitted(Subset(self.apart, functions, names), point)
-            point, functions = first.fit.point, first.functions
-            if problem is self.apart:
-                return first if math.isfinite(first.score) else None
-        trial = self.fits.fitted(Subset(problem, functions, names), point)
+            trial = self.fits.fitted(Subset(self.apart, functions, names), point)
+            point, functions = trial.fit.point, trial.functions
+        if trial is None or problem is not self.apart:
+            trial = self.fits.fitted(Subset(problem, functions, names), point)
         if not math.isfinite(trial.score):
             return None
-        self.tried.append(trial)
+        if problem is self.problem:
+            self.tried.append(trial)
         return trial
 
     def _swapped(self, found: Missing) -> Missing:
@@ -314,7 +315,8 @@ class FreeSearch:
                 continue
             self.progress(f"fitting {rival.replace('_', ' ')}", None)
             names = rest.names | {rival}
-            for problem in (self.apart, self.problem):
+            problems = (self.apart, self.problem)
+            for problem in problems[1:] if self.roughly else problems:
                 trial = self.fits.fitted(Subset(problem, rest.functions, names), point)
                 point = trial.fit.point
             if trial.score < found.score:

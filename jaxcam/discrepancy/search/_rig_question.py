@@ -66,15 +66,15 @@ def rig_question(
     # the recordings determine only the ratio of stiffness and inertia
     stiffness = Shown("K/J", rig.inertia.value, "1/(m^2 s^2)")
     return Question(
-        problem,
-        names,
-        terms,
-        unlisted,
-        True,
-        "rad",
-        rig.references,
-        tuple(run.recording for run in cut),
-        rig.sensors.cam_floor,
+        problem=problem,
+        rig=names,
+        terms=terms,
+        unlisted=unlisted,
+        turned=True,
+        unit="rad",
+        references=rig.references,
+        drives=tuple(run.recording for run in cut),
+        drive_noise=rig.sensors.cam_floor,
         shown={"stiffness": stiffness},
         noisier=noisier,
     )

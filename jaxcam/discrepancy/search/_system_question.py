@@ -151,13 +151,13 @@ def system_question(
         terms, unlisted = listed(references)
         problem = _with_terms(problem, terms)
     return Question(
-        problem,
-        tuple(p.name for p in inside),
-        terms,
-        unlisted,
-        turned,
-        unit,
-        references,
+        problem=problem,
+        rig=tuple(p.name for p in inside),
+        terms=terms,
+        unlisted=unlisted,
+        turned=turned,
+        unit=unit,
+        references=references,
         noisier=noisier,
         location=location,
         **_drives(recordings, drive_channel),
