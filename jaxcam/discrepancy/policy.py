@@ -214,6 +214,9 @@ class Policy:
     elements: int = bounds(
         1, "use of elements with internal states; 0: never, 1: if needed, 2: always"
     )
+    worthwhile: float = bounds(
+        0.1, "with model errors, fraction of the cost that an addition must explain"
+    )
     element_misfit: float = bounds(
         0.1,
         "if model errors are allowed for, fraction of the misfit below which a "

@@ -229,6 +229,8 @@ class FreeSearch:
             grown = found.score - best.score
             if best is found or grown < heat_of(best.fit) * self._least():
                 break
+            if found.functions and grown < self._worthwhile(found):
+                break
             if not apart and found.functions and grown < self._small(found):
                 break
             found = best
@@ -257,6 +259,12 @@ class FreeSearch:
         """Return the gain that may remain unused, given the gain of the fit so far."""
         return self.policy.small * max(self.cost - found.fit.cost, 0.0)
 
+    def _worthwhile(self, found: Missing) -> float:
+        """Return the gain that an addition to a fit must have if model errors are
+        allowed for: some residual always remains.
+        """
+        return self.policy.worthwhile * found.fit.cost if self.roughly else 0.0
+
     def _least(self) -> float:
         """Return the increase in twice the log-evidence that an addition requires."""
         tests = len(self.families) + len(self.terms) + len(KINDS)
@@ -270,8 +278,9 @@ class FreeSearch:
         if not leads:
             return []
         least = max(self._least(), self.policy.promising * leads[0].gain)
-        if not apart and found.functions:
-            least = max(least, self._small(found) / heat_of(found.fit))
+        if found.functions:
+            more = self._worthwhile(found) if apart else self._small(found)
+            least = max(least, more / heat_of(found.fit))
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
 
     def _with(self, problem: Problem, found: Missing, lead: Lead) -> Missing | None:
