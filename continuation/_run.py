@@ -12,7 +12,7 @@ from ._joins import JOINS, joins
 from ._parameter import as_arguments, leaf_of
 from ._passed import corners, located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
-from ._program import Corrected, evaluate
+from ._program import evaluate
 from ._solution import (
     changes_of,
     point_of,
