@@ -211,9 +211,7 @@ def saddle_field(u, p):
 
 def test_a_batch_reports_no_hopf_point_at_a_neutral_saddle():
     problem = continuation.Equilibrium(saddle_field, {"mu": -0.5})
-    batch = continuation.follow_batch(
-        problem, [[0.0, 0.0]], mu, (-0.6, 0.5), points=40
-    )
+    batch = continuation.follow_batch(problem, [[0.0, 0.0]], mu, (-0.6, 0.5), points=40)
     # the eigenvalues at mu = 0 are 1 and -1: their sum changes sign
     sums = np.sum(batch.multipliers[0, : batch.count[0]].real, axis=-1)
     assert sums[0] < 0 < sums[-1]

@@ -140,8 +140,7 @@ def stroboscope(
         Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
     )
     settings.check()
-    system = as_arrays(system)
-    settings = as_arrays(settings)
+    system, settings = as_arrays(system), as_arrays(settings)
     values = None if values is None else np.asarray(values, dtype=float)
     states = _one_for_each(np.asarray(real_array(states, "states")), values)
     lanes = len(states)
