@@ -9,7 +9,7 @@ from jaxtyping import ArrayLike, Float, PyTree
 
 from jaxcam.parameters import VectorLike, Where
 
-from ._batch_run import Axes, follow_lanes, REASONS
+from ._batch_run import Axes, BatchPlan, follow_lanes, REASONS
 from ._context import Context
 from ._follow import checked_bounds
 from ._parameter import as_arguments, leaf_of, pick_one
@@ -178,10 +178,11 @@ def follow_batch(
         )
     z = np.concatenate([starts, p[:, None]], axis=1)
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
-    lane = follow_lanes(
-        problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
-        np.asarray(high), as_traced(settings), points, progress,
+    plan = BatchPlan(
+        problem, algorithm, given, axes, leaf, np.asarray(low), np.asarray(high),
+        as_traced(settings), points,
     )  # fmt: skip
+    lane = follow_lanes(plan, z, signs, progress)
     lane = jax.tree.map(np.asarray, lane)
     passed = lane.passed
     matrices = passed.linearisation
