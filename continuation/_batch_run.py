@@ -168,7 +168,7 @@ def _begin(plan: BatchPlan, starts, signs):
         good = at.success & jnp.all(jnp.isfinite(tangent))
         return Lane(
             at=at,
-            step=settings.step,
+            step=jnp.asarray(settings.step),
             count=jnp.where(good, 1, 0),
             status=jnp.where(good, _RUNNING, _NO_START),
             passed=buffer,

@@ -1,5 +1,6 @@
 """A system built around another one, whose declarations it keeps."""
 
+import abc
 from typing import Any
 
 import equinox as eqx
@@ -35,8 +36,10 @@ class Wrapping(HybridSystem):
         True
     """
 
-    inner: eqx.AbstractVar[HybridSystem]
-    """The system inside."""
+    @property
+    @abc.abstractmethod
+    def inner(self) -> HybridSystem:
+        """Return the system inside."""
 
     @property
     def state_names(self) -> tuple[str, ...]:  # pyright: ignore

@@ -91,16 +91,17 @@ def diagram(
             "a diagram has one parameter; use chart for two, or select one of them"
         )
     values = as_values(values)
+    many, kept = turns, keep
     if dwell is not None:
         if direction == "each":
             raise ValueError(
                 "dwell requires that the state is carried from value to value; choose "
                 "the direction up, down or both"
             )
-        turns, keep = dwell_turns(section, picked, values, dwell)
+        many, kept = dwell_turns(section, picked, values, dwell)
     starts = as_starts(section, states, picked, values)
     job = DiagramJob(
-        section, picked, values, starts, turns, keep, direction, period_tolerance,
+        section, picked, values, starts, many, kept, direction, period_tolerance,
         block, dwell,
     )  # fmt: skip
     store = run_blocks(
