@@ -9,17 +9,17 @@ from jaxtyping import ArrayLike, Float, PyTree
 
 from jaxcam.parameters import VectorLike, Where
 
-from ._batch_run import Axes, follow_lanes, REASONS
+from ._batch_run import Axes, BatchPlan, follow_lanes, REASONS
 from ._context import Context
 from ._follow import checked_bounds
 from ._parameter import as_arguments, leaf_of, pick_one
-from ._point import Branch, Point, set_parameters, with_field
+from ._passed import specials_between
+from ._point import Branch, Point, set_parameters
 from ._program import Corrected
 from ._settings import as_traced, BranchSettings
-from ._solution import point_of, Solution
+from ._solution import point_of, Solution, solution_after, solution_at
 from .algorithms import AbstractAlgorithm, PseudoArclength
 from .problem import AbstractProblem
-from .special import locate, test_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,36 +61,35 @@ class Batch:
                 f"there is no branch {index}; the indices run from 0 to "
                 f"{self.count.size - 1}"
             )
+        if self.count[index] == 0:
+            raise ValueError(
+                f"branch {index} has no points, as {self.reasons[index]}; start it "
+                "elsewhere"
+            )
         problem, context = self._problems(index), self._context
         rows = [
             jax.tree.map(lambda x: x[index, i], self._passed)
             for i in range(int(self.count[index]))
         ]
         points: list[Point] = []
-        arclength, before = 0.0, None
 
-        def add(at: Corrected, tests: dict, kind: str, converged=True, reason=""):
-            here = Solution(problem, at, tests, 0.0, arclength, ())
-            label = len(points) + 1
-            points.append(point_of(context, here, label, kind, reason, converged))
+        def add(here: Solution, kind: str, *details) -> None:
+            points.append(point_of(context, here, len(points) + 1, kind, *details))
 
+        current = solution_at(problem, context.leaf, rows[0], 0.0, 0.0)
         for i, at in enumerate(rows):
-            tests = test_values(problem, context.leaf, at)
-            if before is not None:
-                old, old_tests = before
-                arclength += float(np.linalg.norm((at.z - old.z) / old.scale))
-                for name in tests:
-                    if tests[name] * old_tests[name] < 0:
-                        values = (old_tests[name], tests[name])
-                        found = locate(problem, name, context, old, at, values)
-                        monitors = problem.monitors()
-                        kind = monitors[name].kind if name in monitors else name
-                        special = with_field(at, "z", found.z)
-                        add(special, {}, kind, found.converged, found.reason)
+            if i > 0:
+                before = current
+                current = solution_after(before, context.leaf, at, 0.0)
+                for special in specials_between(context, before, current):
+                    located = special.located
+                    add(
+                        special.current, special.kind, located.reason,
+                        located.converged, special.coefficient, special.criticality,
+                    )  # fmt: skip
             last = i == len(rows) - 1
             kind = "start" if i == 0 else "end" if last else "regular"
-            add(at, tests, kind, reason=self.reasons[index] if last else "")
-            before = at, tests
+            add(current, kind, self.reasons[index] if last else "")
         name, names = self.name, (self.name,)
         return Branch(tuple(points), name, context.bounds, context.leaf, names)
 
@@ -179,10 +178,11 @@ def follow_batch(
         )
     z = np.concatenate([starts, p[:, None]], axis=1)
     signs = np.broadcast_to(np.asarray(direction, float), (lanes,))
-    lane = follow_lanes(
-        problem, algorithm, given, axes, leaf, z, signs, np.asarray(low),
-        np.asarray(high), as_traced(settings), points, progress,
+    plan = BatchPlan(
+        problem, algorithm, given, axes, leaf, np.asarray(low), np.asarray(high),
+        as_traced(settings), points,
     )  # fmt: skip
+    lane = follow_lanes(plan, z, signs, progress)
     lane = jax.tree.map(np.asarray, lane)
     passed = lane.passed
     matrices = passed.linearisation

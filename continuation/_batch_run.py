@@ -1,5 +1,6 @@
 """Take the steps of many branches in one compiled program."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -12,7 +13,10 @@ from jaxcam.hybrid.programs import program
 
 from ._point import set_parameters, with_field
 from ._program import correct_, Corrected
+from ._settings import BranchSettings
+from .algorithms import AbstractAlgorithm
 from .predictors import Station
+from .problem import AbstractProblem
 from .step_control import measure_step
 
 
@@ -83,75 +87,107 @@ class Axes(eqx.Module):
         return jax.tree.unflatten(structure, chosen)
 
 
+class BatchPlan(eqx.Module):
+    """What a run of many branches needs and does not change."""
+
+    problem: AbstractProblem
+    """The problem."""
+    algorithm: AbstractAlgorithm
+    """An algorithm that predicts from one point."""
+    parameters: PyTree
+    """Parameters of all branches."""
+    axes: Axes
+    """Which of these differ between branches."""
+    leaf: int
+    """Index of the parameter that is continued."""
+    low: np.ndarray
+    """Lower bound of this parameter."""
+    high: np.ndarray
+    """Upper bound of this parameter."""
+    settings: BranchSettings
+    """Settings from `as_traced`."""
+    points: int
+    """Maximum number of points on each branch."""
+
+    def at(self, parameters: PyTree) -> AbstractProblem:
+        """Return the problem of one branch, given its parameters."""
+        return set_parameters(self.problem, parameters)
+
+    def mapped(self, function: Callable, *others):
+        """Return `function` of the parameters of each branch and of the `others`, whose
+        leading axis is that of the branches.
+        """
+        axes = (self.axes.tree, *(0 for _ in others))
+        return jax.vmap(function, in_axes=axes)(self.parameters, *others)
+
+
 def follow_lanes(
-    problem, algorithm, given, axes, leaf, z, signs, low, high, s, points, progress,
-):  # fmt: skip
+    plan: BatchPlan, starts, signs, progress: Callable[[float], None] | None
+) -> Lane:
     """Follow all branches to their ends.
 
-    **Arguments:** the problem; an algorithm that predicts from one point; the
-    parameters `given` to the problem, and `axes`, which marks those that differ between
-    branches; the `leaf` that is continued; for each branch, a point `z` and the sign of
-    its direction; the bounds; settings from `as_traced`; the maximum number of
-    `points`; and `progress`, which is called with the completed fraction, or None.
+    **Arguments:** for each branch, a point (state, parameter) to start from and the
+    sign of its direction; and `progress`, which is called with the completed fraction,
+    or None.
 
     Returns:
         The final `Lane` of each branch.
     """
-    lanes = _begin(problem, given, axes, leaf, z, signs, low, high, s, points)
+    lanes = _begin(plan, starts, signs)
     rounds = np.asarray(_WHOLE if progress is None else _ROUNDS)
     while np.any(lanes.status == _RUNNING):
-        lanes = _advance(
-            problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds
-        )
+        lanes = _advance(plan, lanes, rounds)
         if progress is not None:
             # a branch that has ended counts as complete
-            done = np.where(lanes.status == _RUNNING, lanes.count / points, 1.0)
+            running = lanes.status == _RUNNING
+            done = np.where(running, lanes.count / plan.points, 1.0)
             progress(float(np.mean(done)))
     return lanes
 
 
 @program
-def _begin(problem, given, axes, leaf, z, signs, low, high, s, points):
+def _begin(plan: BatchPlan, starts, signs):
     """Return the `Lane` of each branch at its first point."""
-    width = high - low
+    settings = plan.settings
+    width = plan.high - plan.low
 
-    def begin(parameters, z, sign):
-        current = set_parameters(problem, parameters)
-        across = jnp.zeros_like(z).at[-1].set(1.0)
-        at = correct_(current, leaf, z, across, across, width, s.tolerance, 30, False)
+    def begin(parameters, start, sign):
+        across = jnp.zeros_like(start).at[-1].set(1.0)
+        at = correct_(
+            plan.at(parameters), plan.leaf, start, across, across, width,
+            settings.tolerance, 30, False,
+        )  # fmt: skip
         turn = jnp.where(at.tangent[-1] * sign < 0, -1.0, 1.0)
         tangent = turn * at.tangent
         at = with_field(at, "tangent", tangent)
         # the determinant of the Jacobian bordered by the tangent changes sign with it
         at = with_field(at, "determinant", turn * at.determinant)
         buffer = jax.tree.map(
-            lambda x: jnp.zeros((points, *x.shape), x.dtype).at[0].set(x), at
+            lambda x: jnp.zeros((plan.points, *x.shape), x.dtype).at[0].set(x), at
         )
         good = at.success & jnp.all(jnp.isfinite(tangent))
         return Lane(
             at=at,
-            step=s.step,
+            step=jnp.asarray(settings.step),
             count=jnp.where(good, 1, 0),
             status=jnp.where(good, _RUNNING, _NO_START),
             passed=buffer,
         )
 
-    return jax.vmap(begin, in_axes=(axes.tree, 0, 0))(given, z, signs)
+    return plan.mapped(begin, starts, signs)
 
 
 @program
-def _advance(
-    problem, algorithm, given, axes, leaf, lanes, low, high, s, points, rounds,
-):  # fmt: skip
+def _advance(plan: BatchPlan, lanes: Lane, rounds):
     """Attempt up to `rounds` steps on each branch that has not ended."""
+    low, high, settings = plan.low, plan.high, plan.settings
     width = high - low
 
     def advance(parameters, lane: Lane) -> Lane:
-        current = set_parameters(problem, parameters)
-        a, control = lane.at, algorithm.control
+        a, control = lane.at, plan.algorithm.control
         tangent = a.tangent / a.scale / jnp.linalg.norm(a.tangent / a.scale)
         stations = [Station(a.z / a.scale, tangent)]
-        change = algorithm.predictor(stations, lane.step) * a.scale - a.z
+        change = plan.algorithm.predictor(stations, lane.step) * a.scale - a.z
         target = a.z[-1] + change[-1]
         bound = jnp.where(change[-1] > 0, high, low)
         lands = (target > high) | (target < low)
@@ -159,28 +195,28 @@ def _advance(
         guess = a.z + share * change
         guess = guess.at[-1].set(jnp.where(lands, bound, guess[-1]))
         across = jnp.zeros_like(a.z).at[-1].set(1.0 / width)
-        normal = jnp.where(lands, across, algorithm.normal(tangent) / a.scale)
+        normal = jnp.where(lands, across, plan.algorithm.normal(tangent) / a.scale)
         b = correct_(
-            current, leaf, guess, normal, a.tangent, width, s.tolerance,
-            s.max_iterations, False,
+            plan.at(parameters), plan.leaf, guess, normal, a.tangent, width,
+            settings.tolerance, settings.max_iterations, False,
         )  # fmt: skip
         z = b.z.at[-1].set(jnp.where(lands, bound, b.z[-1]))
         b = with_field(b, "z", z)
         measures = measure_step(a, b, guess)
-        refused = list(control.refusals(measures, lane.step, s).values())
+        refused = list(control.refusals(measures, lane.step, settings).values())
         inside = (low <= z[-1]) & (z[-1] <= high)
         finite = jnp.all(jnp.isfinite(b.tangent))
         good = b.success & finite & inside & ~jnp.any(jnp.stack(refused))
-        following = control.next_step(measures, lane.step, s)
+        following = control.next_step(measures, lane.step, settings)
         step = jnp.where(good, following, lane.step / 2)
         count = lane.count + jnp.where(good, 1, 0)
         status = jnp.where(
             good & lands,
             _BOUND,
             jnp.where(
-                ~good & (step < s.min_step),
+                ~good & (step < settings.min_step),
                 _SHORT,
-                jnp.where(count == points, _FULL, _RUNNING),
+                jnp.where(count == plan.points, _FULL, _RUNNING),
             ),
         )
         running = lane.status == _RUNNING
@@ -207,6 +243,6 @@ def _advance(
 
     def together(carry):
         lanes, done = carry
-        return jax.vmap(advance, in_axes=(axes.tree, 0))(given, lanes), done + 1
+        return plan.mapped(advance, lanes), done + 1
 
     return jax.lax.while_loop(going, together, (lanes, jnp.zeros_like(rounds)))[0]

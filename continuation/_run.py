@@ -12,8 +12,15 @@ from ._joins import JOINS, joins
 from ._parameter import as_arguments, leaf_of
 from ._passed import corners, located_between, sign_changes, special_here
 from ._point import Point, set_parameters, with_field, with_parameter
-from ._program import Corrected, evaluate
-from ._solution import changes_of, point_of, Solution, solution_at, stations
+from ._program import evaluate
+from ._solution import (
+    changes_of,
+    point_of,
+    Solution,
+    solution_after,
+    solution_at,
+    stations,
+)
 from ._step import attempt_step, StepAttempt
 from .problem import AbstractProblem, Start
 from .special import ahead, Located
@@ -169,7 +176,9 @@ class Run:
             attempted = self._around_corner(current, attempted, step)
             refusal = attempted.refusal
             if attempted.at is not None:
-                following = self._moved(current, attempted.at, attempted.following)
+                following = solution_after(
+                    current, self.context.leaf, attempted.at, attempted.following
+                )
                 names = sign_changes(self.context, current, following)
                 passed = located_between(self.context, current, following, names)
                 doubt = self._doubt(current, passed)
@@ -204,28 +213,12 @@ class Run:
         usual = self.context.settings.step
         if attempted.solution is None or step > _CORNER * usual:
             return attempted
-        following = self._moved(current, attempted.solution, _CORNER * usual)
+        following = solution_after(
+            current, self.context.leaf, attempted.solution, _CORNER * usual
+        )
         if not corners(current, following):
             return attempted
         return StepAttempt(attempted.solution, attempted.bound, _CORNER * usual)
-
-    def _moved(self, current: Solution, at: Corrected, step: float) -> Solution:
-        length = float(np.linalg.norm((at.z - current.at.z) / current.at.scale))
-        trail = (*current.trail, (current.at.z, current.at.tangent))[-8:]
-        following = solution_at(
-            current.problem,
-            self.context.leaf,
-            at,
-            step,
-            current.arclength + length,
-            trail,
-        )
-        # give an exact zero the previous sign, so that the sign flips in the next step
-        for name, value in following.tests.items():
-            if value == 0:
-                before = current.tests.get(name, 0.0)
-                following.tests[name] = float(np.copysign(np.finfo(float).tiny, before))
-        return following
 
     def _with_fresh_references(self, current: Solution) -> Solution:
         problem = current.problem

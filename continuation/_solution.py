@@ -40,6 +40,25 @@ def solution_at(
     return Solution(problem, at, test_values(problem, leaf, at), step, arclength, trail)
 
 
+def solution_after(
+    current: Solution, leaf: int, at: Corrected, step: float
+) -> Solution:
+    """Return the solution at the next point of the branch; `step` is the length of the
+    step that follows it.
+    """
+    length = float(np.linalg.norm((at.z - current.at.z) / current.at.scale))
+    trail = (*current.trail, (current.at.z, current.at.tangent))[-8:]
+    following = solution_at(
+        current.problem, leaf, at, step, current.arclength + length, trail
+    )
+    # give an exact zero the previous sign, so that the sign flips in the next step
+    for name, value in following.tests.items():
+        if value == 0:
+            before = current.tests.get(name, 0.0)
+            following.tests[name] = float(np.copysign(np.finfo(float).tiny, before))
+    return following
+
+
 def point_of(
     context: Context,
     current: Solution,

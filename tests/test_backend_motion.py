@@ -324,6 +324,19 @@ def test_a_budget_of_rows_and_progress():
     np.testing.assert_array_equal(short.impacts.time, run.impacts.time[:count])
 
 
+@pytest.mark.parametrize("backend", ["llvm", "xla"])
+def test_max_steps_is_kept_exactly(backend):
+    """One row more than attempts, because the start has a row and short steps never
+    fail. Neither the chunks of 2048 attempts nor blocks of 16 divide the number.
+    """
+    made = jaxcam.simulate(
+        ImpactOscillator(omega=2.8, wall=9.0), [-0.5, 0.0], 0.0, 900.0,
+        settings=Settings(max_step=0.02, backend=backend), max_steps=2501,
+    )  # fmt: skip
+    assert int(made.code) == 1
+    assert len(made.steps.time) == 2502
+
+
 def test_settings_name_the_back_end(unchecked_types):
     with pytest.raises(ValueError, match="backend"):
         stroboscope(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from jaxcam import HybridSystem, Settings, simulate
+from jaxcam.hybrid import flow
 from jaxcam.models import (
     BouncingBall,
     CamFollower,
@@ -109,6 +110,20 @@ def test_meaningless_settings(settings, word):
 
 
 @pytest.mark.usefixtures("unchecked_types")
+@pytest.mark.parametrize(
+    "options", [{"tolerance": 1e-6}, {"solver": diffrax.Tsit5()}, {"max_step": 0.1}]
+)
+def test_a_setting_that_is_given_twice(options):
+    (name,) = options
+    text = refusal(BouncingBall(), ABOVE, settings=Settings(), **options)
+    assert text == f"{name} and settings are both given; pass Settings({name}=...)"
+
+
+def test_flow_checks_its_settings():
+    with pytest.raises(ValueError, match="tolerance is -1"):
+        flow(BouncingBall(), ABOVE, 0.0, 1.0, settings=Settings(tolerance=-1.0))
+
+
 def test_unknown_engine():
     text = refusal(BouncingBall(), ABOVE, engine="leapfrog")
     assert "'leapfrog'" in text and '"loop" or "diffeqsolve"' in text

@@ -2,6 +2,7 @@
 
 import json
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import rich.console
@@ -180,6 +181,12 @@ def test_batch_agrees_with_single_branches():
         slope = batch.multipliers[i, :n, 0].real
         assert slope == pytest.approx(value + 3 * x**2, abs=1e-9)
     lane = batch.lane(7)
+    # a special point has its own multiplier and tangent: both vanish at a fold
+    for point in lane.of_kind("fold"):
+        assert abs(point.multipliers[0]) < 1e-9
+        assert abs(point.tangent[-1]) < 1e-9
+        assert point.criticality and point.arclength > 0
+    assert np.all(np.diff([point.arclength for point in lane.points]) > 0)
     fold = 2 * (-values[7] / 3) ** 1.5
     found = [point.parameter for point in lane.of_kind("fold")]
     assert found == pytest.approx([-fold, fold], abs=1e-10)
@@ -195,6 +202,22 @@ def test_batch_agrees_with_single_branches():
     assert len(lane.regular) == len(single.points)
 
 
+def saddle_field(u, p):
+    """A saddle for |mu| < 1, with eigenvalues mu + 1 and mu - 1, in an uncoupled
+    equation.
+    """
+    return jnp.stack([(p["mu"] + 1.0) * u[0], (p["mu"] - 1.0) * u[1]])
+
+
+def test_a_batch_reports_no_hopf_point_at_a_neutral_saddle():
+    problem = continuation.Equilibrium(saddle_field, {"mu": -0.5})
+    batch = continuation.follow_batch(problem, [[0.0, 0.0]], mu, (-0.6, 0.5), points=40)
+    # the eigenvalues at mu = 0 are 1 and -1: their sum changes sign
+    sums = np.sum(batch.multipliers[0, : batch.count[0]].real, axis=-1)
+    assert sums[0] < 0 < sums[-1]
+    assert batch.lane(0).special == ()
+
+
 def test_a_lane_that_cannot_start_spoils_nothing():
     batch = continuation.follow_batch(
         CUSP, [[np.nan], cusp_start(-1.0)], a, (-3.0, 3.0), direction=-1, points=5
@@ -202,6 +225,8 @@ def test_a_lane_that_cannot_start_spoils_nothing():
     assert batch.count.tolist() == [0, 5]
     assert "not a solution" in batch.reasons[0]
     assert "requested number" in batch.reasons[1]
+    with pytest.raises(ValueError, match="branch 0 has no points"):
+        batch.lane(0)
     with pytest.raises(ValueError, match="3 values for 2 branches"):
         continuation.follow_batch(
             CUSP, [[0.0], [0.0]], a, (-3.0, 3.0),

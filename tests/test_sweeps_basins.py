@@ -12,6 +12,7 @@ from jaxcam.sweeps import (
     chart,
     follow_basins,
     Grid,
+    ImpactSection,
     largest_exponents,
     load_sweep,
     Stroboscopic,
@@ -156,6 +157,14 @@ def test_nobody_can_start():
         basins(SECTION, Grid((0.5, 0), (1, 1), (2, 2)), 20, keep=4)
 
 
+def test_charts_and_basins_need_one_sample_per_period():
+    section = ImpactSection(OSCILLATOR)
+    with pytest.raises(ValueError, match="a chart needs .* ImpactSection is not; pass"):
+        chart(section, ("omega", "restitution"), [2.6], [0.8], [-0.66, 0.02])
+    with pytest.raises(ValueError, match="basins need .* ImpactSection is not; pass"):
+        basins(section, GRID, 40)
+
+
 @pytest.mark.slow
 def test_chart_of_two_parameters():
     """P(1,1) at its own parameters; the label of a pair is that of the single run."""
@@ -185,6 +194,14 @@ def test_exponents_tell_chaos_from_orbits():
     both = largest_exponents(SECTION, [[-0.66, 0.02]], 400)
     assert not both.chaotic[0]
     assert both.largest[0] == pytest.approx(np.log(0.8) * 2.6 / (2 * np.pi), rel=0.05)
+
+
+def test_no_trajectories_give_no_samples():
+    """Empty arrays of the shapes that `Stroboscope` documents."""
+    none = stroboscope(OSCILLATOR, np.zeros((0, 2)), 12, skip=7)
+    assert none.states.shape == (0, 5, 2)
+    assert none.hits.shape == none.rests.shape == (0, 5)
+    assert none.code.shape == none.impacts.shape == none.steps.shape == (0,)
 
 
 def test_skipped_turns_change_nothing():

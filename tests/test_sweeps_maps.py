@@ -68,6 +68,11 @@ def test_a_straight_boundary(halves):
     )  # fmt: skip
 
 
+def test_entropy_where_no_state_is_admissible():
+    found = basin_entropy(np.full((10, 10), -3))
+    assert np.isnan(found.entropy) and np.isnan(found.boundary_entropy)
+
+
 def test_a_fractal_boundary():
     """The exponent is one less the Cantor set's dimension, ln 2 / ln 3, to 0.03."""
     grid = Grid((0,), (1,), (CANTOR_CELLS,))

@@ -11,12 +11,13 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import zarr
 from sweep_maps import LOGISTIC, SQUARE_ROOT
 
-from jaxcam.sweeps import basins, diagram, Grid, load_sweep
+from jaxcam.sweeps import basins, diagram, Grid, load_sweep, Map
 from jaxcam.sweeps.blocks._disk import OnDisk
 
 
@@ -196,6 +197,59 @@ def test_another_sweep_is_not_mixed_in(stored):
         basins(SQUARE_ROOT, GRID, 41, block=3, out=stored, resume=True)
     with pytest.raises(ValueError, match=r"different sweep \(other sweep, "):
         diagram(LOGISTIC, "mu", [3.0], [0.3], out=stored, resume=True)
+
+
+def _line(slope, offset):
+    return lambda x, p: slope * x + p["a"] + offset
+
+
+@pytest.mark.parametrize(
+    "edited",
+    [
+        lambda x, p: 0.5 * x + 2.0 * p["a"],
+        lambda x, p: 0.5 * x - p["a"],
+        lambda x, p: jnp.sin(x) + p["a"],
+        _line(0.5, 1.0),
+    ],
+    ids=["constant", "operation", "name", "closure"],
+)
+def test_an_edited_function_is_another_sweep(tmp_path, edited):
+    """The name of every lambda is the same; its code is not."""
+
+    def run(function, resume):
+        function.__qualname__ = "<lambda>"
+        section = Map(function, {"a": 1.0})
+        return diagram(
+            section, "a", [1.0], [0.3], turns=8, keep=2, out=tmp_path, resume=resume
+        )
+
+    base = _line(0.5, 0.0) if edited.__closure__ else lambda x, p: 0.5 * x + p["a"]
+    run(base, False)
+    with pytest.raises(ValueError, match="different sweep"):
+        run(edited, True)
+    run(_line(0.5, 0.0) if edited.__closure__ else base, True)
+
+
+def test_the_identity_of_a_function_is_equal_in_another_process():
+    """A set of constants is the usual cause of a difference: its order is random."""
+    script = """
+        from jaxcam.sweeps.blocks._identity import about_section
+        from jaxcam.sweeps import Map
+        def f(x, p):
+            return [y for y in x if y in {"a", "b", "c", "d"}]
+        print(about_section(Map(f))["function"]["sha256"])
+    """
+    found = [
+        subprocess.run(
+            [sys.executable, "-c", textwrap.dedent(script)],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    ]
+    assert found[0] == found[1] and len(found[0].strip()) == 64
 
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path):

@@ -19,6 +19,8 @@ import numpy as np
 
 # Penetration (rad) up to which a gap that has just opened does not count as closed
 _ROUNDING = 1e-13
+# interval between two samples, and the longest integration step (s)
+_INTERVAL = 5e-4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,8 +83,8 @@ class Truth:
 class _Cam:
     """The drive, and the contact angle as a function of time."""
 
-    def __init__(self, rig: RealRig, speed: float, phase: float):
-        self.rig, self.speed, self.phase = rig, speed, phase
+    def __init__(self, rig: RealRig, speed: float):
+        self.rig, self.speed = rig, speed
         self.coefficients = rig.profile()
         self.order = 1j * np.arange(len(self.coefficients))
         self.first = self.coefficients * self.order
@@ -90,7 +92,7 @@ class _Cam:
 
     def drive(self, t):
         """Return the cam angle and its first and second derivatives."""
-        angle, rate, change = self.speed * t + self.phase, self.speed, 0.0
+        angle, rate, change = self.speed * t, self.speed, 0.0
         for share, frequency in ((0.7, 0.31), (0.3, 0.87)):
             w, a = 2 * math.pi * frequency, self.rig.wander * self.speed * share
             angle += a / w * math.sin(w * t)
@@ -110,14 +112,14 @@ class _Cam:
 class _Follower:
     """The follower's flights, impacts and contacts, starting slightly above the cam."""
 
-    def __init__(self, rig: RealRig, cam: _Cam, interval: float):
-        self.rig, self.cam, self.interval = rig, cam, interval
+    def __init__(self, rig: RealRig, cam: _Cam):
+        self.rig, self.cam = rig, cam
         self.t, (self.x, self.v, _) = 0.0, cam.surface(0.0)
         self.x += 0.01
         self.resting, self.landed = False, 0.0
         # longest next step, shorter just after an impact: a flight must not end within
         # its first step
-        self.longest = interval
+        self.longest = _INTERVAL
         self.impacts: list[tuple[float, float]] = []
         self.contacts: list[tuple[float, float]] = []
 
@@ -129,7 +131,7 @@ class _Follower:
                 continue
             ahead, later = self._fly(h)
             if not self._inside(ahead, self.t + h):
-                self.x, self.v, self.longest = ahead, later, self.interval
+                self.x, self.v, self.longest = ahead, later, _INTERVAL
                 self._step(h, target)
                 continue
             self._hit(
@@ -185,13 +187,13 @@ class _Follower:
         self.v = rate + r * approach
         self.impacts.append((self.t, approach))
         pull = acceleration - self.rig.acceleration(self.x, self.v)
-        flight = 2 * r * approach / pull if pull > 0 else self.interval
+        flight = 2 * r * approach / pull if pull > 0 else _INTERVAL
         # the total duration of the remaining flights is flight / (1 - r)
         if 0 < flight < 1e-6 * (1 - r):
             self.resting, self.landed = True, self.t
-            self.v, self.longest = rate, self.interval
+            self.v, self.longest = rate, _INTERVAL
         else:
-            self.longest = min(self.interval, max(flight / 2, 1e-8))
+            self.longest = min(_INTERVAL, max(flight / 2, 1e-8))
 
 
 def _bisect(h: float, crossed: Callable[[float], bool]) -> float:
@@ -211,19 +213,17 @@ def simulate_rig(
     duration: float,
     *,
     settle: float = 20.0,
-    interval: float = 5e-4,
-    phase: float = 0.0,
 ) -> Truth:
     """Simulate the rig at `speed` (rad/s) and keep the last `duration` (s)."""
-    cam = _Cam(rig, speed, phase)
-    follower = _Follower(rig, cam, interval)
-    total = round((settle + duration) / interval)
+    cam = _Cam(rig, speed)
+    follower = _Follower(rig, cam)
+    total = round((settle + duration) / _INTERVAL)
     rows = []
     for sample in range(total):
         t = follower.t
         rows.append((t, cam.drive(t)[0], follower.x, follower.v))
-        follower.advance((sample + 1) * interval)
-    start = total - round(duration / interval)
+        follower.advance((sample + 1) * _INTERVAL)
+    start = total - round(duration / _INTERVAL)
     time, turned, angle, velocity = np.array(rows[start:]).T
     begin = time[0]
     hits = np.array(follower.impacts).reshape(-1, 2)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..hybrid.programs import program
+from ..parameters import as_arrays
 from ..recordings import Recording, Segments
 from ._free_run import free_run, FreeRun, Prepared, prepared, restarted, simulated
 from .engine import (
@@ -89,7 +90,7 @@ def fit_free_run(
         >>> round(fit_free_run(model, [fallen], [gravity]).values["gravity"], 4)
         9.81
     """
-    model = jax.tree.map(_array, model)
+    model = as_arrays(model)
     places = parameter_places(model, parameters)
     runs = [r.recording if isinstance(r, Segments) else r for r in recordings]
     layouts = [Layout(with_constants(model, run), places) for run in runs]
@@ -134,10 +135,6 @@ def fit_free_run(
         tuple(free_run(best, run, samples=samples) for run in recordings),
         settled,
     )
-
-
-def _array(leaf):
-    return jnp.asarray(leaf, dtype=float) if isinstance(leaf, float) else leaf
 
 
 def _missed(ready: Sequence[tuple[Layout, Prepared]], values):

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from ..hybrid import HybridSystem
 from ..hybrid.programs import program
+from ..hybrid.runge_kutta import array_step, RK4
 from ..models import ConstantRestitution, LinearInSpeed, PowerLawRestitution
 from ..recordings import RecordingError, Segments
 from .engine import Model, Turning
@@ -305,11 +306,7 @@ def _speed_for_height(system, angle, duration, height) -> Array:
     def top(speed):
         def step(carry, _):
             t, x, highest = carry
-            k1 = system.vector_field(t, x)
-            k2 = system.vector_field(t + h / 2, x + h / 2 * k1)
-            k3 = system.vector_field(t + h / 2, x + h / 2 * k2)
-            k4 = system.vector_field(t + h, x + h * k3)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            x, _, _ = array_step(RK4, system.vector_field, t, x, h)
             gap = system.gap(t + h, x)
             # a flight ends when the follower is back on the cam
             open_ = (highest >= 0) & (gap > 0)

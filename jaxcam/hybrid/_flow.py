@@ -2,7 +2,6 @@
 
 import functools
 
-import diffrax
 import equinox as eqx
 import equinox.internal as eqxi
 import jax
@@ -62,7 +61,7 @@ def flow(
     The numbers of impacts, contacts and releases may differ between batch elements. If
     the start is invalid (a negative gap, a state that is not finite, or t1 < t0),
     `code` gives the reason and the final state is NaN. Outside of transformations, the
-    system is checked first.
+    settings and the system are checked first.
 
     Args:
         system: The system to simulate.
@@ -76,8 +75,8 @@ def flow(
         An `Arrival`, whose `code` is an index into `RESULTS`.
 
     Raises:
-        ValueError: The state is complex; or, outside of transformations, a parameter or
-            a function of the system is invalid.
+        ValueError: The state is complex; or, outside of transformations, a setting, a
+            parameter or a function of the system is invalid.
 
     Examples:
         >>> from jaxcam.hybrid import flow
@@ -87,11 +86,12 @@ def flow(
     """
     state = real_array(state)
     system = as_arrays(system)
-    if settings is None:
-        settings = Settings(solver=diffrax.Dopri8())
-    settings = as_arrays(settings)
-    if not is_traced((system, state, t0)) and not is_tracing():
-        check_system(system, jnp.asarray(t0, jnp.float64), state, settings)
+    settings = as_arrays(Settings() if settings is None else settings)
+    if not is_tracing():
+        if not is_traced(settings):
+            settings.check()
+        if not is_traced((system, state, t0)):
+            check_system(system, jnp.asarray(t0, jnp.float64), state, settings)
     t0, t1 = jnp.asarray(t0, jnp.float64), jnp.asarray(t1, jnp.float64)
     run = _flow if settings.plain else whole(_flow)
     return run(system, settings, state, t0, t1, max_steps)

@@ -50,7 +50,7 @@ def simulate(
     t0: RealScalar,
     t1: RealScalar,
     *,
-    tolerance: FloatScalar = 1e-10,
+    tolerance: FloatScalar | None = None,
     solver: diffrax.AbstractSolver | None = None,
     settings: Settings | None = None,
     max_step: FloatScalar | None = None,
@@ -70,9 +70,10 @@ def simulate(
         t0: Start time (s).
         t1: End time (s), t1 >= t0.
         tolerance: Error allowed per step, relative to the distance that each component
-            moves.
+            moves; default: 1e-10.
         solver: Explicit Runge-Kutta solver from diffrax; default: `Dopri8`.
-        settings: All accuracy settings; overrides `tolerance` and `solver`.
+        settings: All accuracy settings, instead of `tolerance`, `solver` and
+            `max_step`.
         max_step: Longest integration step (s). The solver may step over a force that is
             briefer, or a barrier that is narrower, than one step.
         max_steps: Maximum number of attempted steps. The default is a million; inside
@@ -89,7 +90,8 @@ def simulate(
 
     Raises:
         ValueError: The state is not finite or a gap is negative, t1 < t0, a setting is
-            out of range, or a function of the system has the wrong shape.
+            out of range or given twice, or a function of the system has the wrong
+            shape.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -168,12 +170,14 @@ def _trajectory(system, settings, t0, t1, parts: Parts, code) -> Trajectory:
 
 def _chosen(settings, tolerance, solver, max_step) -> Settings:
     """Return the settings of a run, given as `Settings` or as single arguments."""
+    given = {"tolerance": tolerance, "solver": solver, "max_step": max_step}
+    given = {name: value for name, value in given.items() if value is not None}
     if settings is None:
-        chosen = diffrax.Dopri8() if solver is None else solver
-        return Settings(tolerance=tolerance, solver=chosen, max_step=max_step)
-    if max_step is not None:
+        return Settings(**given)
+    if given:
+        name = next(iter(given))
         raise ValueError(
-            "max_step and settings are both given; pass Settings(max_step=...)"
+            f"{name} and settings are both given; pass Settings({name}=...)"
         )
     return settings
 

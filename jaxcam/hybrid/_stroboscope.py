@@ -140,8 +140,7 @@ def stroboscope(
         Settings(tolerance=1e-9, chatter_depth=1.0) if settings is None else settings
     )
     settings.check()
-    system = as_arrays(system)
-    settings = as_arrays(settings)
+    system, settings = as_arrays(system), as_arrays(settings)
     values = None if values is None else np.asarray(values, dtype=float)
     states = _one_for_each(np.asarray(real_array(states, "states")), values)
     lanes = len(states)
@@ -156,6 +155,8 @@ def stroboscope(
         )
     length = None if period is None else jnp.asarray(period, dtype=jnp.float64)
     _check_times(system, period, turns, skip)
+    if not lanes:
+        return _no_trajectories(turns - skip, states.shape[1])
     start = jnp.asarray(t0, dtype=jnp.float64)
     _check(*split_lanes(system, where, values), settings, start, length, states)
 
@@ -197,6 +198,12 @@ def _one_for_each(states, values) -> np.ndarray:
     if states.ndim != 1:
         return states
     return np.broadcast_to(states, (1 if values is None else len(values), len(states)))
+
+
+def _no_trajectories(samples: int, n: int) -> Stroboscope:
+    counts, sampled = np.zeros(0, int), np.zeros((0, samples), int)
+    states = np.zeros((0, samples, n))
+    return Stroboscope(states, counts, counts, counts, sampled, sampled)
 
 
 def _check_times(system, period, turns, skip) -> None:

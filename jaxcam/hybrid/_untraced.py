@@ -129,5 +129,7 @@ def _by_xla(system, settings, t0, state, t1, budget, progress):
         logs.append(log)
         used += size
     _said(progress, t1, t0, t1)
-    whole = jax.tree.map(lambda *parts: np.concatenate(parts), *logs)
-    return whole, mode, jnp.asarray(carried.status, jnp.int32)
+    # the last chunk may go beyond the budget: another length would need another program
+    whole = jax.tree.map(lambda *parts: np.concatenate(parts)[:budget], *logs)
+    status = RUNNING if float(carried.steps) > budget else carried.status
+    return whole, mode, jnp.asarray(status, jnp.int32)

@@ -9,10 +9,11 @@ import jax.numpy as jnp
 
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
+from ._wrapping import Wrapping
 from .surface import has_friction, surfaces
 
 
-class WithSection(SwitchedSystem):
+class WithSection(Wrapping, SwitchedSystem):
     """A system with a Poincaré section as its last switching surface.
 
     The section changes neither the vector field nor the state. Steps end at it, and the
@@ -27,6 +28,11 @@ class WithSection(SwitchedSystem):
     """+1 to count rising crossings, -1 for falling ones, 0 for both."""
     number: int = eqx.field(static=True)
     """Number of switching surfaces of the system."""
+
+    @property
+    def inner(self) -> HybridSystem:
+        """Return the system."""
+        return self.system
 
     def switching(self, t, state):
         """Return the switching functions of the system, then that of the section."""
@@ -87,33 +93,6 @@ class WithSection(SwitchedSystem):
         if isinstance(self.system, SwitchedSystem):
             return self.system.restitution_kind
         return "kinematic"
-
-    @property
-    def period(self) -> Any:
-        """Return the period of the system."""
-        return self.system.period
-
-    @property
-    def breakpoints(self) -> Any:
-        """Return the breakpoints of the system."""
-        return self.system.breakpoints
-
-    @property
-    def active(self) -> bool:  # pyright: ignore
-        """Return whether impacts of the system may add energy."""
-        return self.system.active
-
-    def constraint_name(self, number: int) -> str:
-        """Return the name of a constraint of the system."""
-        return self.system.constraint_name(number)
-
-    def prepared(self) -> "WithSection":
-        """Return the prepared system with the same section."""
-        return eqx.tree_at(lambda s: s.system, self, self.system.prepared())
-
-    def check(self) -> None:
-        """Raise `ValueError` if a parameter of the system has an unphysical value."""
-        self.system.check()
 
     def _own(self, t, state, name: str, otherwise):
         if isinstance(self.system, SwitchedSystem):

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..hybrid import HybridSystem, simulate, SwitchedSystem
+from ..hybrid import HybridSystem, simulate, SwitchedSystem, Wrapping
 from ._errors import RecordingError
 from ._recording import Recording
 
@@ -18,7 +18,7 @@ from ._recording import Recording
 _FINER = 256
 
 
-class Wandering(HybridSystem):
+class Wandering(Wrapping):
     """A driven system whose drive speed drifts slowly, as in real drives.
 
     The drive turns at `speed (1 + depth w)` with w = 0.7 cos(2 pi 0.31 t) + 0.3 cos(2
@@ -52,26 +52,8 @@ class Wandering(HybridSystem):
             )
 
     @property
-    def state_names(self) -> tuple[str, ...]:  # pyright: ignore
-        return self.base.state_names
-
-    @property
-    def constraint_names(self) -> tuple[str, ...]:  # pyright: ignore
-        return self.base.constraint_names
-
-    @property
-    def state_units(self) -> tuple[str, ...]:  # pyright: ignore
-        return self.base.state_units
-
-    @property
-    def period(self):
-        return self.base.period
-
-    def prepared(self) -> "Wandering":
-        return eqx.tree_at(lambda s: s.base, self, self.base.prepared())
-
-    def check(self) -> None:
-        self.base.check()
+    def inner(self) -> HybridSystem:
+        return self.base
 
     def angle(self, t) -> Array:
         """Return the angle of the drive (rad) at `t` (s), elementwise."""

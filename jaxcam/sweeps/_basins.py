@@ -9,7 +9,7 @@ import numpy as np
 from ._basins_job import BasinsJob, default_scale
 from ._basins_result import Basins
 from ._grid import Grid
-from ._inputs import as_section, check_turns
+from ._inputs import as_section, check_regular, check_turns
 from ._together import together
 from .blocks import Progress, run_blocks
 
@@ -79,11 +79,7 @@ def basins(
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance, reruns)
-    if not section.regular:
-        raise ValueError(
-            f"basins need a section that is sampled once per period, and a "
-            f"{type(section).__name__} is not; pass the system itself"
-        )
+    check_regular(section, "basins need")
     if not 0 < same < 1:
         raise ValueError(f"same is {same:g}; give a number in (0, 1), such as 1e-3")
     if block is not None and block < 1:

@@ -45,7 +45,7 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
         box: Number of cells along each side of a box.
 
     Returns:
-        A `BasinEntropy`.
+        A `BasinEntropy`; NaN if all states are inadmissible.
 
     Raises:
         ValueError: The box does not fit into the grid.
@@ -68,11 +68,12 @@ def basin_entropy(attractor, box: int = 5) -> BasinEntropy:
     boxes = np.moveaxis(cut.reshape(shape), range(0, 2 * len(sides), 2),
                         range(len(sides)))  # fmt: skip
     boxes = boxes.reshape(int(np.prod(sides)), -1)
-    counts = np.stack([(boxes == k).sum(axis=1) for k in np.unique(boxes) if k != -3])
+    known = [k for k in np.unique(boxes) if k != -3]
+    if not known:
+        return BasinEntropy(np.nan, np.nan)
+    counts = np.stack([(boxes == k).sum(axis=1) for k in known])
     total = counts.sum(axis=0)
     counts, total = counts[:, total > 0], total[total > 0]
-    if not counts.size:
-        return BasinEntropy(np.nan, np.nan)
     p = counts / total
     entropy = -np.sum(np.where(p > 0, p * np.log(np.where(p > 0, p, 1.0)), 0.0), axis=0)
     mixed = (counts > 0).sum(axis=0) > 1

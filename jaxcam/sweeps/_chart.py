@@ -10,7 +10,7 @@ import numpy as np
 from ..parameters import Pick, pick
 from ._chart_result import Chart
 from ._exponents import largest_exponents
-from ._inputs import as_section, as_starts, as_values, check_turns
+from ._inputs import as_section, as_starts, as_values, check_regular, check_turns
 from .attractors import settle
 from .blocks import (
     about_section,
@@ -89,6 +89,7 @@ def chart(
     """
     section = as_section(system)
     check_turns(turns, keep, period_tolerance, reruns)
+    check_regular(section, "a chart needs")
     if not isinstance(where, tuple) or len(where) != 2:
         raise ValueError("where must be a tuple of two parameters: (one, other)")
     if exponents and exponents < 16:
@@ -98,7 +99,7 @@ def chart(
     if block is not None and block < 1:
         raise ValueError(f"block is {block}; give 1 or more values")
     picked = pick(where, section.system)
-    first, second = as_values(first, 1), as_values(second, 1)
+    first, second = as_values(first), as_values(second)
     job = ChartJob(
         section, picked, first, second, states, turns, keep, period_tolerance, reruns,
         exponents, block,

@@ -3,6 +3,7 @@
 import numpy as np
 import xarray
 
+from ._exponents import Exponents
 from .attractors import APERIODIC, label_names, Labels
 
 
@@ -49,9 +50,10 @@ class Chart:
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
         found = label_names(numbers)
         if "exponent" in self.dataset:
-            largest = self.dataset["exponent"].values
-            error = self.dataset["exponent_stderr"].values
-            chaotic = (numbers.turns == APERIODIC) & (largest > 3 * error)
+            exponents = Exponents(
+                self.dataset["exponent"].values, self.dataset["exponent_stderr"].values
+            )
+            chaotic = (numbers.turns == APERIODIC) & exponents.chaotic
             found = np.where(chaotic, "chaotic", found)
         return found
 

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from ..parameters import pick
-from ._diagram_job import CarriedJob, DiagramJob
+from ._diagram_job import DiagramJob
 from ._diagram_result import Diagram
-from ._dwell import dwell_turns, DwellJob
+from ._dwell import dwell_turns
 from ._inputs import as_section, as_starts, as_values, check_turns
 from .blocks import Progress, run_blocks
 from .sections import BEHIND
@@ -90,7 +90,8 @@ def diagram(
         raise ValueError(
             "a diagram has one parameter; use chart for two, or select one of them"
         )
-    values = as_values(values, 1)
+    values = as_values(values)
+    many, kept = turns, keep
     if dwell is not None:
         if direction == "each":
             raise ValueError(
@@ -98,14 +99,11 @@ def diagram(
                 "the direction up, down or both"
             )
         many, kept = dwell_turns(section, picked, values, dwell)
-        turns, keep = int(many.max()), int(kept.max())
     starts = as_starts(section, states, picked, values)
-    length = turns, keep, direction, period_tolerance
-    of = section, picked, values, starts, *length, block
-    if dwell is not None:
-        job = DwellJob(*of, dwell=dwell)
-    else:
-        job = DiagramJob(*of) if direction == "each" else CarriedJob(*of)
+    job = DiagramJob(
+        section, picked, values, starts, many, kept, direction, period_tolerance,
+        block, dwell,
+    )  # fmt: skip
     store = run_blocks(
         job,
         out=out,

@@ -4,6 +4,7 @@ import functools
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import ArrayLike
 
 from ..parameters import Pick
 from ._inputs import LANES
@@ -24,9 +25,13 @@ _CHAIN = 16
 
 
 class DiagramJob(AbstractJob):
-    """Computes the motions at all values independently."""
+    """Computes the motions at all values: independently for the direction "each";
+    otherwise one after the other, each from the final state of the previous one.
 
-    chained = False
+    **Arguments:** `turns`, `keep`: a number for all values, or one for each value,
+    which differ only if the state is carried; `dwell`: the times in seconds from which
+    these numbers follow, if any.
+    """
 
     def __init__(
         self,
@@ -34,40 +39,44 @@ class DiagramJob(AbstractJob):
         where: Pick,
         values: np.ndarray,
         starts: np.ndarray,
-        turns: int,
-        keep: int,
+        turns: ArrayLike,
+        keep: ArrayLike,
         direction: str,
         period_tolerance: float,
         block: int | None,
+        dwell: tuple[float, float] | None,
     ):
         self.section, self.where = section, where
-        self.turns, self.keep, self.period_tolerance = turns, keep, period_tolerance
-        self.values, self.starts, going = self._ordered(values, starts, direction)
-        self.layout = self._layout(going, direction, block)
-
-    def _ordered(self, values, starts, direction):
-        return values, starts, np.zeros(len(values), dtype=np.int8)
-
-    def _block(self, starts: int) -> int:
-        return max(1, LANES // starts)
+        self.period_tolerance = period_tolerance
+        self.chained = direction != "each"
+        index, going = _order(values, direction)
+        self.values, self.starts = values[index], starts[index]
+        self.turns = np.broadcast_to(turns, values.shape)[index]
+        self.keep = np.broadcast_to(keep, values.shape)[index]
+        self.layout = self._layout(going, direction, block, dwell)
 
     def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
-        del before
         first, last = self.layout.bounds(block)
+        some = slice(first, last)
+        what = self.section, self.where, self.values[some], self.starts[some]
+        if not self.chained:
+            turns, keep = int(self.turns[0]), int(self.keep[0])
+            return functools.partial(
+                each_value, *what, turns, keep, self.period_tolerance
+            )
         return functools.partial(
-            each_value,
-            self.section,
-            self.where,
-            self.values[first:last],
-            self.starts[first:last],
-            self.turns,
-            self.keep,
+            one_after_the_other,
+            *what,
+            None if before is None else before["final"][-1],
+            self.turns[some],
+            self.keep[some],
+            int(self.keep.max()),
             self.period_tolerance,
         )
 
-    def _layout(self, going, direction: str, block: int | None) -> StoreLayout:
+    def _layout(self, going, direction: str, block: int | None, dwell) -> StoreLayout:
         points, starts, n = self.starts.shape
-        keep = self.keep
+        keep = int(self.keep.max())
         components = self.section.names(n)
         each, sampled = ("point", "start"), ("point", "start", "sample")
         variables = {
@@ -85,12 +94,11 @@ class DiagramJob(AbstractJob):
             variables["phase"] = StoredVariable(
                 sampled, tail, "float64", {"units": "turns"}
             )
-        values = self.values[:, None] if self.values.ndim == 1 else self.values
+        if self.chained:
+            dims = ("point", "start", "component")
+            variables["final"] = StoredVariable(dims, (starts, n), "float64")
         coordinates = {
-            name: ("point", values[:, i], {"role": "parameter"})
-            for i, name in enumerate(self.where.names)
-        }
-        coordinates |= {
+            self.where.names[0]: ("point", self.values, {"role": "parameter"}),
             "direction": ("point", going, {"about": "0 each, 1 up, -1 down"}),
             **component_coordinates(components),
         }
@@ -100,60 +108,30 @@ class DiagramJob(AbstractJob):
             "where": list(self.where.names),
             "values": digest(self.values),
             "starts": digest(self.starts),
-            "turns": self.turns,
+            "turns": int(self.turns.max()),
             "keep": keep,
             "direction": "up, then down" if direction == "both" else direction,
             "period_tolerance": self.period_tolerance,
         }
-        size = self._block(starts) if block is None else block
-        size = min(size, points)
+        if dwell is not None:
+            identity["dwell"] = [float(seconds) for seconds in dwell]
+        usual = _CHAIN if self.chained else max(1, LANES // starts)
+        size = min(usual if block is None else block, points)
         identity["block"] = size
         return StoreLayout(points, size, variables, coordinates, identity)
 
 
-class CarriedJob(DiagramJob):
-    """Computes the motions at increasing values, decreasing values or both; each motion
-    starts from the final state of the previous one.
+def _order(values: np.ndarray, direction: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the order in which the values are passed, and the direction of each: 1
+    upwards, -1 downwards, or 0.
     """
-
-    chained = True
-
-    def _ordered(self, values, starts, direction):
-        order = np.argsort(values, kind="stable")
-        ways = {"up": (1,), "down": (-1,), "both": (1, -1)}[direction]
-        index = np.concatenate([order[::way] for way in ways])
-        going = np.repeat(np.array(ways, dtype=np.int8), len(values))
-        self.first = np.zeros(len(index), dtype=bool)
-        # only the first motion starts from a given state; a downward sweep continues
-        # from the final state of the upward sweep
-        self.first[0] = True
-        return values[index], starts[index], going
-
-    def _block(self, starts: int) -> int:
-        del starts
-        return _CHAIN
-
-    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
-        first, last = self.layout.bounds(block)
-        return functools.partial(
-            one_after_the_other,
-            self.section,
-            self.where,
-            self.values[first:last],
-            self.starts[first:last],
-            self.first[first:last],
-            None if before is None else before["final"][-1],
-            np.full(last - first, self.turns),
-            np.full(last - first, self.keep),
-            self.keep,
-            self.period_tolerance,
-        )
-
-    def _layout(self, going, direction: str, block: int | None) -> StoreLayout:
-        layout = super()._layout(going, direction, block)
-        starts, n = self.starts.shape[1:]
-        final = StoredVariable(("point", "start", "component"), (starts, n), "float64")
-        return layout._replace(variables={**layout.variables, "final": final})
+    if direction == "each":
+        return np.arange(len(values)), np.zeros(len(values), dtype=np.int8)
+    # a downward sweep continues from the final state of the upward sweep
+    order = np.argsort(values, kind="stable")
+    ways = {"up": (1,), "down": (-1,), "both": (1, -1)}[direction]
+    index = np.concatenate([order[::way] for way in ways])
+    return index, np.repeat(np.array(ways, dtype=np.int8), len(values))
 
 
 def each_value(section, where, values, starts, turns, keep, period_tolerance) -> Arrays:
@@ -174,19 +152,17 @@ def each_value(section, where, values, starts, turns, keep, period_tolerance) ->
 
 
 def one_after_the_other(
-    section, where, values, starts, first, carried, turns, keep, room, period_tolerance
+    section, where, values, starts, carried, turns, keep, room, period_tolerance
 ) -> Arrays:
-    """Compute the motions at the given values in order; `first` marks the values at
-    which the motions start from the given initial states.
+    """Compute the motions at the given values in order.
 
-    **Arguments:** `turns`, `keep`: one number for each value; `room`: number of samples
-    stored at each value, padded with NaN.
+    **Arguments:** `carried`: the states before the first value, or None to start from
+    the given initial states; `turns`, `keep`: one number for each value; `room`:
+    number of samples stored at each value, padded with NaN.
     """
     rows = []
-    for value, start, anew, many, kept in zip(
-        values, starts, first, turns, keep, strict=True
-    ):
-        state = start if anew or carried is None else carried
+    for value, start, many, kept in zip(values, starts, turns, keep, strict=True):
+        state = start if carried is None else carried
         # after a failed motion, start again from the given initial state
         state = np.where(np.isfinite(state).all(axis=1, keepdims=True), state, start)
         lanes = np.full(len(state), value)

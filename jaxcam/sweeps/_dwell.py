@@ -1,16 +1,10 @@
-"""Compute a diagram as in an experiment: wait at each value, then record, for times
-given in seconds.
-"""
+"""Convert the settling and recording times of an experiment to numbers of periods."""
 
-import functools
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from ..parameters import Pick
-from ._diagram_job import CarriedJob, one_after_the_other
-from .blocks import Arrays
 from .sections import AbstractSection
 
 
@@ -46,34 +40,3 @@ def dwell_turns(
             f"{np.max(length):.3g} s; record longer"
         )
     return waited + stored, stored
-
-
-class DwellJob(CarriedJob):
-    """Computes the motions of a sweep, for settling and recording times in seconds."""
-
-    def __init__(self, *arguments, dwell: tuple[float, float]):
-        self.dwell = dwell
-        super().__init__(*arguments)
-
-    def work(self, block: int, before: Arrays | None) -> Callable[[], Arrays]:
-        first, last = self.layout.bounds(block)
-        values = self.values[first:last]
-        turns, keep = dwell_turns(self.section, self.where, values, self.dwell)
-        return functools.partial(
-            one_after_the_other,
-            self.section,
-            self.where,
-            values,
-            self.starts[first:last],
-            self.first[first:last],
-            None if before is None else before["final"][-1],
-            turns,
-            keep,
-            self.keep,
-            self.period_tolerance,
-        )
-
-    def _layout(self, going, direction: str, block: int | None):
-        layout = super()._layout(going, direction, block)
-        identity = {**layout.identity, "dwell": list(map(float, self.dwell))}
-        return layout._replace(identity=identity)

@@ -80,7 +80,7 @@ def follow_basins(
     """
     section = as_section(system)
     picked = pick(where, section.system)
-    values = as_values(values, 1)
+    values = as_values(values)
     made: list[Basins] = []
     numbers: list[np.ndarray] = []
     # the latest orbit of each attractor

@@ -52,19 +52,22 @@ def check_turns(
         raise ValueError(f"reruns is {reruns}; give 0 or more")
 
 
-def as_values(values, parameters: int) -> np.ndarray:
-    """Return parameter values, shape `(points,)`, or `(points, parameters)` for several
-    parameters.
+def check_regular(section: AbstractSection, needs: str) -> None:
+    """Raise `ValueError` for a section that is not sampled once per period; `needs` is
+    the beginning of the message, such as "basins need".
     """
-    values = np.asarray(values, dtype=float)
-    shape = (len(values),) if parameters == 1 else (len(values), parameters)
-    if values.ndim == 0 or values.shape != shape or not len(values):
+    if not section.regular:
         raise ValueError(
-            f"values has shape {values.shape}; give one row for each point and one "
-            f"column for each of {parameters} parameters"
-            if parameters > 1
-            else f"values has shape {values.shape}; give a vector"
+            f"{needs} a section that is sampled once per period, and a "
+            f"{type(section).__name__} is not; pass the system itself"
         )
+
+
+def as_values(values) -> np.ndarray:
+    """Return values of a parameter, shape `(points,)`."""
+    values = np.asarray(values, dtype=float)
+    if values.ndim != 1 or not len(values):
+        raise ValueError(f"values has shape {values.shape}; give a vector")
     if not np.all(np.isfinite(values)):
         raise ValueError("a value is not finite; all parameter values must be finite")
     return values

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxcam import HybridSystem
+from jaxcam.hybrid import Wrapping
 from jaxcam.hybrid.surface import normal_directions, normal_velocity
 
 from ._scalar import one_constraint
@@ -14,7 +15,7 @@ from ._scalar import one_constraint
 _NEWTON = 8
 
 
-class Reversed(HybridSystem):
+class Reversed(Wrapping):
     """A system whose motion at time t is that of `forward` at time -t.
 
     Its impacts reverse those of `forward`: the speed is divided by the coefficient of
@@ -33,17 +34,16 @@ class Reversed(HybridSystem):
     forward: HybridSystem
     """The system in forward time."""
 
-    def prepared(self) -> "Reversed":
-        """Return an equivalent system that is cheaper to evaluate.
+    @property
+    def inner(self) -> HybridSystem:
+        """Return the system in forward time."""
+        return self.forward
 
-        Returns:
-            A `Reversed` of the prepared system.
-        """
-        return Reversed(self.forward.prepared())
-
-    def check(self) -> None:
-        """Raise `ValueError` if a parameter of `forward` has an unphysical value."""
-        self.forward.check()
+    @property
+    def breakpoints(self) -> jax.Array | None:
+        """Return minus the breakpoints of `forward` (s), or `None`."""
+        times = self.forward.breakpoints
+        return None if times is None else -jnp.asarray(times, dtype=jnp.float64)
 
     def vector_field(self, t, state) -> jax.Array:
         """Return minus the field of `forward`.
@@ -96,8 +96,3 @@ class Reversed(HybridSystem):
 
         before = jax.lax.fori_loop(0, _NEWTON, newton, -wanted)
         return rest + before * direction
-
-    @property
-    def period(self):
-        """Period of the forcing."""
-        return self.forward.period

@@ -86,6 +86,15 @@ def orbit_where(
     return _where(system, where, guess, lambda *orbit: test(monodromy_of(*orbit)))
 
 
+def _orbit_with_multiplier(system, where, guess, multiplier: float) -> SpecialPoint:
+    """Find the parameter value at which the orbit has this real multiplier."""
+
+    def test(matrix):
+        return jnp.linalg.det(matrix - multiplier * jnp.eye(matrix.shape[0]))
+
+    return orbit_where(system, where, guess, test)
+
+
 def fold_of_orbit(
     system: HybridSystem, where: Callable[[Any], Any], guess: ImpactOrbit
 ) -> SpecialPoint:
@@ -108,11 +117,7 @@ def fold_of_orbit(
         >>> fold_of_orbit(system, lambda s: s.wall, orbit).orbit.number
         1
     """
-
-    def test(matrix):
-        return jnp.linalg.det(matrix - jnp.eye(matrix.shape[0]))
-
-    return orbit_where(system, where, guess, test)
+    return _orbit_with_multiplier(system, where, guess, 1.0)
 
 
 def flip_of_orbit(
@@ -137,11 +142,7 @@ def flip_of_orbit(
         >>> flip_of_orbit(system, lambda s: s.wall, orbit).orbit.number
         1
     """
-
-    def test(matrix):
-        return jnp.linalg.det(matrix + jnp.eye(matrix.shape[0]))
-
-    return orbit_where(system, where, guess, test)
+    return _orbit_with_multiplier(system, where, guess, -1.0)
 
 
 def graze_of_orbit(

@@ -4,11 +4,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from ...hybrid import HybridSystem
+from ...hybrid import HybridSystem, Wrapping
 from ._hidden_elements import HiddenElement
 
 
-class WithHidden(HybridSystem):
+class WithHidden(Wrapping):
     """A system with an element that is driven by a coordinate and exerts a force on it.
 
     The state is that of the base followed by that of the element; the state of the
@@ -25,6 +25,10 @@ class WithHidden(HybridSystem):
     """Components of the base state that are the coordinate (which drives the element
     and on which its force acts) and its velocity.
     """
+
+    @property
+    def inner(self) -> HybridSystem:
+        return self.base
 
     @property
     def _size(self) -> int:
@@ -44,24 +48,9 @@ class WithHidden(HybridSystem):
         return (*units, *self.element.units(units[self.coordinate[0]]))
 
     @property
-    def period(self):
-        return self.base.period
-
-    @property
-    def breakpoints(self):
-        return self.base.breakpoints
-
-    @property
-    def active(self) -> bool:  # pyright: ignore
-        return self.base.active
-
-    @property
     def speed(self):
         """Speed of the drive (rad/s), if the base has one."""
         return self.base.speed  # pyright: ignore
-
-    def prepared(self) -> "WithHidden":
-        return eqx.tree_at(lambda s: s.base, self, self.base.prepared())
 
     def check(self) -> None:
         self.base.check()

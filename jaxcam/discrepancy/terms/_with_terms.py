@@ -5,12 +5,12 @@ import jax
 import jax.numpy as jnp
 
 from ...fitting import Turning
-from ...hybrid import HybridSystem
+from ...hybrid import HybridSystem, Wrapping
 from ._term import Motion, Term
 from ._where import Where
 
 
-class WithTerms(HybridSystem):
+class WithTerms(Wrapping):
     """A system with terms added to it.
 
     The `contact` of a term is subtracted from the gap of its `constraint`, and its
@@ -29,28 +29,8 @@ class WithTerms(HybridSystem):
     """
 
     @property
-    def state_names(self) -> tuple[str, ...]:  # pyright: ignore
-        return self.base.state_names
-
-    @property
-    def constraint_names(self) -> tuple[str, ...]:  # pyright: ignore
-        return self.base.constraint_names
-
-    @property
-    def state_units(self) -> tuple[str, ...]:  # pyright: ignore
-        return self.base.state_units
-
-    @property
-    def period(self):
-        return self.base.period
-
-    @property
-    def breakpoints(self):
-        return self.base.breakpoints
-
-    @property
-    def active(self) -> bool:  # pyright: ignore
-        return self.base.active
+    def inner(self) -> HybridSystem:
+        return self.base
 
     @property
     def speed(self):
@@ -61,9 +41,6 @@ class WithTerms(HybridSystem):
         terms = tuple(term.prepared() for term in self.terms)
         new = self.base.prepared(), terms
         return eqx.tree_at(lambda s: (s.base, s.terms), self, new)
-
-    def check(self) -> None:
-        self.base.check()
 
     def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
         """Return the motion at which the terms of a coordinate are evaluated.

@@ -18,7 +18,6 @@ from ._run import (
     rows_of_kind as rows_of_kind,
     run as run,
     run_many as run_many,
-    run_raw as run_raw,
     run_reversible as run_reversible,
 )
 from ._scale import first_extents as first_extents

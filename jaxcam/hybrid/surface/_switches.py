@@ -1,22 +1,26 @@
 """The branches of a switched system, its switching functions and its resets."""
 
-from typing import Any
-
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .._switched import SwitchedSystem
 from .._system import HybridSystem
 from .._types import RealScalar, State
+from .._wrapping import Wrapping
 
 
-class OnSides(HybridSystem):
+class OnSides(Wrapping):
     """A switched system on fixed sides of its surfaces: one branch of its field."""
 
     system: SwitchedSystem
     """The system."""
     negative: Bool[Array, " k"]
     """Whether the motion is on the negative side of each surface, shape `(k,)`."""
+
+    @property
+    def inner(self) -> SwitchedSystem:
+        """Return the system."""
+        return self.system
 
     def vector_field(self, t: RealScalar, state: State) -> State:
         """Return the rates of the branch."""
@@ -29,16 +33,6 @@ class OnSides(HybridSystem):
     def impact(self, t: RealScalar, state: State) -> Float[Array, "*constraints n"]:
         """Return the states after impacts of the system."""
         return self.system.impact(t, state)
-
-    @property
-    def period(self) -> Any:
-        """Return the period of the system."""
-        return self.system.period
-
-    @property
-    def breakpoints(self) -> Any:
-        """Return the breakpoints of the system."""
-        return self.system.breakpoints
 
     @property
     def signs(self) -> Float[Array, " k"]:

@@ -20,7 +20,7 @@ from ._motion import Motion
 from ._polynomial import crossing, LocalFit
 from ._record_ends import clear_of_end, settled_alike
 from ._release import release_time
-from ._segments import Boundary, Contact, Flight, Impacts
+from ._segments import Boundary, Contact, Flight, Impacts, impacts_of
 
 
 # A supposed impact is rejected if the motion before it recedes from the surface by more
@@ -115,7 +115,7 @@ def cut(
         and crossed[place]["approach"] > 0
         and boundaries[place].kind == "impact"
     ]
-    return tuple(flights), tuple(contacts), _gather(impacts)
+    return tuple(flights), tuple(contacts), impacts_of(impacts)
 
 
 def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
@@ -334,14 +334,3 @@ def settling_time(flight: Flight, restitution: float) -> float:
     late = landing.stderr if np.isfinite(landing.stderr) else 0.0
     rest = restitution / (1 - min(restitution, 0.95))
     return landing.time + late + (flight.duration + late) * rest
-
-
-def _gather(found: list[tuple[dict, int]]) -> Impacts:
-    numbers = {"flight", "side"}
-    names = [f.name for f in dataclasses.fields(Impacts) if f.name not in numbers]
-    columns = {name: np.array([row[name] for row, _ in found]) for name in names}
-    return Impacts(
-        **columns,
-        flight=np.array([n for _, n in found], dtype=int),
-        side=np.array([row["side"] for row, _ in found], dtype=int),
-    )

@@ -16,6 +16,7 @@ from ...hybrid.programs import program
 from ...hybrid.surface import contact_acceleration
 from .._drive import Drive
 from .._rig import Quantity, Rig
+from ._contact_stretches import stretches
 
 
 # Number of phases per turn
@@ -117,8 +118,7 @@ def sure_contact(
     **Arguments:** the result of `may_hop`, and the samples of observed releases.
     """
     sure = ~doubtful
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], doubtful.astype(int), [0]])))
-    for first, last in zip(edges[::2], edges[1::2]):
+    for first, last in stretches(doubtful):
         if np.any((releases >= first) & (releases <= last)):
             sure[first:last] = True
     return sure

@@ -7,34 +7,33 @@ from scipy.signal import find_peaks
 
 # Length (s) of the windows on either side of a kink in which it is detected
 WINDOW = 0.01
+# Smallest jump in slope of a kink, in standard errors
+_THRESHOLD = 7.0
 
 
 def find_kinks(
     samples: Float[np.ndarray, " k"],
     interval: float,
     noise: float,
-    *,
-    window: float = WINDOW,
-    threshold: float = 7.0,
 ) -> Int[np.ndarray, " kinks"]:
     """Return the index of the first sample after each jump in velocity.
 
-    Parabolas through the `window` (s) before and after each sample are compared; a kink
-    is a local maximum of the jump in slope that exceeds `threshold` times its standard
+    Parabolas through the `WINDOW` before and after each sample are compared; a kink is
+    a local maximum of the jump in slope that exceeds `_THRESHOLD` times its standard
     error.
     """
-    score = jump_score(samples, interval, noise, window)
-    apart = max(1, int(window / interval / 2))
-    return find_peaks(score, height=threshold, distance=apart)[0]
+    score = _jump_score(samples, interval, noise)
+    apart = max(1, int(WINDOW / interval / 2))
+    return find_peaks(score, height=_THRESHOLD, distance=apart)[0]
 
 
-def jump_score(
-    samples: Float[np.ndarray, " k"], interval: float, noise: float, window: float
+def _jump_score(
+    samples: Float[np.ndarray, " k"], interval: float, noise: float
 ) -> Float[np.ndarray, " k"]:
     """Return the jump in slope before each sample divided by its standard error, shape
     `(k,)`.
     """
-    count = max(6, round(window / interval))
+    count = max(6, round(WINDOW / interval))
     score = np.zeros(len(samples))
     if len(samples) < 2 * count:
         return score

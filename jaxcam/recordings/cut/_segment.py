@@ -14,7 +14,7 @@ from ._hidden_hops import before_release, may_hop, sure_contact
 from ._motion import Motion
 from ._placed import placed
 from ._polynomial import measured_noise
-from ._segments import Boundary, Flight, no_impacts, Segments
+from ._segments import Boundary, Flight, impacts_of, Segments
 from ._surface import Surface
 from ._surface_fit import fit_surface, refine_surface
 
@@ -223,4 +223,4 @@ def _one_flight(recording, channel, noise) -> Segments:
     height = float(np.ptp(recording[channel]))
     flight = Flight(start, stop, 0, len(recording), height)
     clock = recording.time
-    return Segments(recording, channel, noise, clock, (flight,), (), no_impacts())
+    return Segments(recording, channel, noise, clock, (flight,), (), impacts_of([]))

@@ -1,6 +1,7 @@
 """The parts of a recording: flights, contacts and their boundaries."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -199,9 +200,13 @@ def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def no_impacts() -> Impacts:
-    """Return the impacts of a recording that has none."""
-    none = np.zeros(0)
-    fields = [field.name for field in dataclasses.fields(Impacts)]
-    number = none.astype(int)
-    return Impacts(**dict.fromkeys(fields[:-2], none), flight=number, side=number)
+def impacts_of(found: Sequence[tuple[dict, int]]) -> Impacts:
+    """Return impacts in arrays, given the numbers of each and of the flight before."""
+    numbers = {"flight", "side"}
+    names = [f.name for f in dataclasses.fields(Impacts) if f.name not in numbers]
+    columns = {name: np.array([row[name] for row, _ in found]) for name in names}
+    return Impacts(
+        **columns,
+        flight=np.array([n for _, n in found], dtype=int),
+        side=np.array([row["side"] for row, _ in found], dtype=int),
+    )

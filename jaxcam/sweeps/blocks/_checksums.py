@@ -11,7 +11,7 @@ import xarray
 import zarr
 import zarr.errors
 
-from ._store import FORMAT, SWEEP, VERSION
+from ._store import FORMAT, READABLE, SWEEP
 
 
 UNFINISHED = -1
@@ -144,7 +144,9 @@ def stored_identity(path: Path) -> dict | None:
     """Return the identity of the sweep at a path; None where there is no sweep."""
     try:
         attributes = dict(zarr.open_group(str(path), mode="r").attrs)
-        if attributes.get("format") != FORMAT or attributes.get("version") != VERSION:
+        if attributes.get("format") != FORMAT:
+            return None
+        if attributes.get("version") not in READABLE:
             return None
         identity = json.loads(str(attributes[SWEEP]))
         # the size of the blocks and the names of the arrays, needed to read the sweep

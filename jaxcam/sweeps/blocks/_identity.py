@@ -1,7 +1,11 @@
 """Describe the identity of a sweep as JSON, to compare it on resuming."""
 
 import dataclasses
+import functools
 import hashlib
+import inspect
+import json
+import types
 from typing import Any
 
 import equinox as eqx
@@ -43,6 +47,63 @@ def digest(array) -> dict[str, Any]:
     }
 
 
+def _about_function(function: Any) -> Any:
+    """Describe a function by its name and a hash of its code, its defaults and the
+    variables that it closes over, all of which are equal in another process.
+    """
+    if isinstance(function, functools.partial):
+        parts = (function.func, function.args, function.keywords)
+        return {"partial": [_plain(part) for part in parts]}
+    name = getattr(function, "__qualname__", type(function).__name__)
+    inner = inspect.unwrap(function)
+    inner = getattr(inner, "__func__", inner)
+    if not isinstance(inner, types.FunctionType):
+        return name
+    cells = [_content(cell) for cell in inner.__closure__ or ()]
+    defaults = [inner.__defaults__, inner.__kwdefaults__]
+    about = [_code(inner.__code__), *map(_constant, cells), *map(_constant, defaults)]
+    return {
+        "function": name,
+        "sha256": hashlib.sha256(json.dumps(about).encode()).hexdigest(),
+    }
+
+
+def _content(cell: types.CellType) -> Any:
+    """Return the variable of a cell; None if it is not assigned yet."""
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return None
+
+
+def _code(code: types.CodeType) -> list:
+    """Describe compiled code, without the names of files and the line numbers."""
+    constants = [_constant(value) for value in code.co_consts]
+    return [code.co_code.hex(), constants, list(code.co_names)]
+
+
+def _constant(value: Any) -> Any:
+    """Describe a constant of a function, or a variable that it closes over."""
+    if isinstance(value, types.CodeType):
+        return _code(value)
+    if isinstance(value, tuple | list):
+        return [_constant(one) for one in value]
+    if isinstance(value, dict):
+        return {str(k): _constant(one) for k, one in value.items()}
+    if isinstance(value, frozenset | set):
+        # their order differs between processes
+        return sorted(json.dumps(_constant(one)) for one in value)
+    if isinstance(value, jax.Array | np.ndarray | np.generic):
+        return np.asarray(value).tolist()
+    # not followed further, because functions can refer to each other
+    inner = getattr(value, "__code__", None)
+    if inner is not None:
+        return _code(inner)
+    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+        return repr(value)
+    return type(value).__name__
+
+
 def _plain(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -53,8 +114,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     if callable(value):
-        # the name alone, because a memory address would differ between runs
-        return getattr(value, "__qualname__", type(value).__name__)
+        return _about_function(value)
     if dataclasses.is_dataclass(value):
         fields = dataclasses.fields(value)
         return {"class": type(value).__name__} | {

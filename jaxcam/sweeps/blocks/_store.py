@@ -10,7 +10,9 @@ import xarray
 
 SWEEP = "sweep"
 """Name of the attribute with the description of the sweep."""
-FORMAT, VERSION = "jaxcam sweep", 1
+FORMAT, VERSION = "jaxcam sweep", 2
+# version 1 differs only in the description of functions, by their names alone
+READABLE = (1, VERSION)
 
 
 class StoredVariable(NamedTuple):
