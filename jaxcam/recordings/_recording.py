@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ._errors import RecordingError
 
@@ -37,6 +37,10 @@ class Recording:
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Known constants of this recording, keyed by the names of the system's fields:
     `{"mass": 0.31}`. A fit does not change them.
+    """
+    filled: Bool[np.ndarray, " k"] | None = None
+    """Samples that `mend` interpolated, shape `(k,)`: they keep the sampling uniform,
+    but no fit uses them. `None` if there are none.
     """
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
@@ -79,7 +83,10 @@ class Recording:
                 f"{self.time[-1]:g} s."
             )
         channels = {name: samples[keep] for name, samples in self.channels.items()}
-        return dataclasses.replace(self, time=self.time[keep], channels=channels)
+        filled = None if self.filled is None else self.filled[keep]
+        return dataclasses.replace(
+            self, time=self.time[keep], channels=channels, filled=filled
+        )
 
 
 @dataclasses.dataclass(frozen=True)
