@@ -107,9 +107,17 @@ class Case:
         return len(self.recordings)
 
     def __getitem__(self, index: int | str) -> Recording:
-        """Return a recording by its index, or by the start of its name (`"run4"`)."""
+        """Return a recording by its index, its name, or the start of its name
+        (`"run4"`).
+
+        Raises:
+            RecordingError: The name is none of them, and not the start of exactly one.
+        """
         if isinstance(index, int):
             return self.recordings[index]
+        same = [run for run in self.recordings if run.name == index]
+        if same:
+            return same[0]
         found = [run for run in self.recordings if run.name.startswith(index)]
         if len(found) != 1:
             names = _listed(run.name for run in self.recordings)
