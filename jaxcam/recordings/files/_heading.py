@@ -5,7 +5,9 @@ import re
 from .._units import ending_of
 
 
-_WITH_UNIT = re.compile(r"(.+?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s/]+(/s(?:\^?.)?)?))")
+_WITH_UNIT = re.compile(
+    r"(.+?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s/]+(?:/s(?:\^?.)?)?))"
+)
 
 
 def channel_name(heading: str, unit: str = "") -> str:
