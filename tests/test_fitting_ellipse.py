@@ -1,5 +1,6 @@
 """Joint confidence regions: their geometry, and how often they hold the truth."""
 
+import dataclasses
 import math
 
 import jax.numpy as jnp
@@ -117,6 +118,13 @@ def test_the_cost_at_the_edge_is_the_chi_square(found):
     curve = fitting.profile(found, "gravity", values=[one.value, away])
     cost = fitting.excess_cost(found, {"gravity": away})
     assert cost == pytest.approx(curve.cost[-1], abs=2e-3)
+
+
+def test_an_unconstrained_parameter_has_no_range_to_profile(found):
+    blind = tuple(dataclasses.replace(one, stderr=math.inf) for one in found.estimates)
+    blind = dataclasses.replace(found, estimates=blind)
+    with pytest.raises(ValueError, match="inf, so .* give the `values`"):
+        fitting.profile(blind, "gravity")
 
 
 def test_the_worst_pair_is_said(found):

@@ -76,7 +76,13 @@ def test_mending():
     mended = mend(run)
     assert len(mended.recordings) == 2
     first, second = mended.recordings
-    assert list(np.flatnonzero(first.meta["filled"])) == [100, 101, 300]
+    assert first.filled is not None and second.filled is None
+    assert list(np.flatnonzero(first.filled)) == [100, 101, 300]
+    # the marks follow the samples, in a part and when a part is mended again
+    part = first.between(0.1, 0.2)
+    assert part.filled is not None and list(np.flatnonzero(part.filled)) == [0, 1]
+    (again,) = mend(first.between(0.2, 0.4)).recordings
+    assert again.filled is not None and list(np.flatnonzero(again.filled)) == [100]
     np.testing.assert_allclose(first["cam_angle_rad"], angle[:600], atol=1e-9)
     np.testing.assert_allclose(second["cam_angle_rad"], angle[650:], atol=1e-9)
     words = " ".join(mended.notes)

@@ -3,13 +3,16 @@
 import dataclasses
 import json
 
+import equinox as eqx
 import hostile_files
+import jax
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
 from jaxcam.fitting import impact_law
+from jaxcam.fitting._restitution import fit_rows
 from jaxcam.recordings import ImpactTable, read_impacts, RecordingError
 from jaxcam.recordings.files import is_impact_table
 
@@ -186,6 +189,29 @@ def test_what_is_to_be_known_of_a_table():
     v = np.linspace(1.0, 1.1, 10)
     narrow = impact_law(ImpactTable("narrow", v, 0.7 * v + 0.01 * np.sin(9 * v)))
     assert any("1.10 times as fast as" in one for one in narrow.sentences())
+
+
+class Saturating(eqx.Module):
+    """A coefficient that reaches one only at infinity."""
+
+    a: jax.Array
+
+    def __call__(self, speed, approach_speed):
+        del speed, approach_speed
+        return self.a / (1 + self.a)
+
+
+@pytest.mark.parametrize(("r", "converged"), [(0.7, True), (1.2, False)])
+def test_a_law_that_did_not_converge_says_so(r, converged):
+    """At an optimum, a step predicts a gain below 0.01; r = 1.2 has no optimum."""
+    v, error = np.linspace(0.2, 2.0, 12), np.full(12, 0.01)
+    data = np.stack([0 * v, v, r * v, 0 * v, error, 0 * v])
+    law = fit_rows(data, Saturating(1.0), ("a",))  # pyright: ignore
+    assert law.converged == converged
+    assert ("did not converge" in law.sentence()) != converged
+    found = impact_law(ImpactTable("exact", v, 0.7 * v))
+    found = dataclasses.replace(found, laws={"constant": law})
+    assert any("did not converge" in one for one in found.sentences()) != converged
 
 
 def command(*words):

@@ -161,6 +161,10 @@ def test_a_wall_that_was_moved_is_where_the_record_says(tmp_path):
     assert part.impacts.count >= 2
     (other,) = setup.segments([dataclasses.replace(run, constants={"wall": 0.1})])
     assert other.impacts.count == 0
+    # a recording that is cut keeps its segments beside one that is not
+    mine = dataclasses.replace(part, flights=part.flights[:2])
+    again, kept = setup.segments([run, mine])
+    assert kept.flights is mine.flights and len(again.flights) == len(part.flights)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Comparison with a model, flight by flight."""
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -23,6 +24,7 @@ from jaxcam.recordings import (
     segment_case,
 )
 from jaxcam.recordings.against_model import compare_case
+from jaxcam.recordings.cut import Boundary, Contact
 from jaxcam.recordings.files import read_recordings
 
 
@@ -121,6 +123,7 @@ def test_initial_states_are_fitted_exactly():
     )
     assert found.row("flight", "height_m").ratio < 1e-6
     assert found.row("flight", "velocity_m_s").ratio < 1e-6
+    assert [row.unit for row in found.rows] == ["m", "m/s"]
     slower = compare(FallingBody(9.0), segment(drop, "height_m", noise=1e-3))
     # a wrong acceleration leaves a parabola less its best line
     left = 0.81 / 2 * (time**2 - np.polyval(np.polyfit(time, time**2, 1), time))
@@ -138,6 +141,28 @@ def test_a_model_that_cannot_follow_is_said():
     found = compare(Exploding(), segment(drop, "height_m", noise=1e-3))
     assert found.rows == ()
     assert "could not follow 1 flights" in found.sentence()
+
+
+def test_a_channel_without_a_unit_has_none():
+    time = np.arange(40) / 15
+    height = 40 + 3 * time - 9.81 / 2 * time**2
+    drop = Recording("drop", time, {"position": height})
+    found = compare(FallingBody(), segment(drop, "position", noise=1e-3))
+    assert found.row("flight").unit == "" and "the position" in found.sentence()
+    assert " rms" in found.sentence() and "  " not in found.sentence()
+
+
+def test_samples_after_a_release_are_no_contact():
+    """A release located 9 samples late does not add these samples to the contact."""
+    time = np.arange(60) * 1e-2
+    height = np.where(time < 0.3, 0.0, 0.05 * (time - 0.3))
+    drop = Recording("drop", time, {"height_m": height})
+    ends = [Boundary(t, 0.0, kind, "") for t, kind in ((0.0, "landing"), (0.395, ""))]
+    contact = Contact(*ends, first=0, last=31, settled=0.1)
+    part = segment(drop, "height_m", noise=1e-3)
+    part = dataclasses.replace(part, flights=(), contacts=(contact,), sure=None)
+    row = compare(FallingBody(), part).row("contact")
+    assert row.samples == 21 and row.ratio < 1e-6
 
 
 def test_unmeasurable_noise_is_refused():

@@ -100,6 +100,22 @@ def test_a_unit_beside_a_name_or_below_it(tmp_path, head):
     np.testing.assert_allclose(run["angle_rad"], ANGLE * angle, atol=1e-12)
 
 
+def test_every_unit_that_is_converted_is_known_in_a_heading(tmp_path):
+    """MN, a meganewton, is not mistaken for mN."""
+    heads = "Time (s);a (mm/s^2);w [°/s²];b/deg/s^2;F (mN);G (MN);p (turns)"
+    text = "\n".join([heads, *(f"{k};1;1;1;1;{k};{k}" for k in range(4)), ""])
+    (run,) = read_recordings(written(tmp_path, text))
+    factors = {
+        "a_m_s2": 1e-3,
+        "w_rad_s2": np.pi / 180,
+        "b_rad_s2": np.pi / 180,
+        "f_N": 1e-3,
+        "G (MN)": 1,
+        "p_rad": 2 * np.pi,
+    }
+    assert {name: samples[1] for name, samples in run.channels.items()} == factors
+
+
 @pytest.mark.parametrize("how", ["utf-16", "utf-8-sig", "cp1252"])
 def test_encodings_of_other_programs(tmp_path, how):
     text = "Weg µ\n" + table(head="Zeit (s);Winkel (°)")

@@ -1,5 +1,6 @@
 """Reading recordings: good files as they are, bad files with one sentence."""
 
+import dataclasses
 import gzip
 import math
 
@@ -10,7 +11,7 @@ import pytest
 
 from jaxcam.data import DEMO_RIG
 from jaxcam.recordings import read_case, read_recording, RecordingError
-from jaxcam.recordings.files import read_recordings
+from jaxcam.recordings.files import CAM_FOLLOWER, Case, read_recordings
 
 
 SPEED = 150.0 * math.pi / 30
@@ -150,7 +151,9 @@ def test_rows_of_other_length(tmp_path):
 def test_missing_and_wrong_columns(tmp_path):
     table = columns()
     table["follower"] = table.pop("follower_angle_rad")
-    sentence = refusal(written(tmp_path, text(table)))
+    file = written(tmp_path, text(table))
+    assert set(read_recording(file).channels) == {"cam_angle_rad", "follower"}
+    sentence = refusal(file, channels=CAM_FOLLOWER)
     assert "`follower_angle_rad` is missing" in sentence
     assert "`time_s`, `cam_angle_rad`, `follower`" in sentence
     headless = "\n".join(text(columns()).splitlines()[1:]) + "\n"
@@ -222,6 +225,10 @@ def test_cases(tmp_path):
     assert all(len(run) == 8000 for run in case)
     with pytest.raises(RecordingError, match="3 names begin with"):
         case["run"]
+    # a whole name counts, even if another name begins with it
+    names = ("run1", "run10", "run2")
+    many = Case("many", tuple(dataclasses.replace(case[0], name=n) for n in names))
+    assert [many[name].name for name in names] == list(names)
     with pytest.raises(RecordingError, match="no such folder"):
         read_case(tmp_path / "none")
     with pytest.raises(RecordingError, match="this is a file"):

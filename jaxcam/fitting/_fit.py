@@ -1,56 +1,34 @@
 """Fit the parameters of a `Problem` by Levenberg-Marquardt, eliminating the states."""
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._descend import descend, Descent, Objective
 from ._doubts import far_from_data
 from ._fit_result import finish, Fit
 from .engine import (
     already_loose,
-    assemble,
-    Blocks,
-    Costs,
-    damped_step,
     free_columns,
     inside,
     loosened,
     own_states,
     Point,
-    prior_cost,
     Problem,
-    total_cost,
     Weights,
 )
 
 
 _ITERATIONS = 60
-PROMISE = 1e-3
-"""The iteration ends if the predicted gain in twice the log-likelihood is below this
-value.
-"""
-# Largest gain predicted for an undamped step at an optimum: such a step changes no
-# parameter by more than a tenth of its standard error
-_GRADIENT = 1e-2
-# Maximum number of corrections before a step is accepted or rejected
-_CORRECTIONS = 3
-# Each correction must reduce the excess cost to less than this fraction of its previous
-# value
-_LEADS_BACK = 0.5
 # A flight with more pieces than this is first fitted with loose joints
 _LONG = 16
 # Factors on parameters without a tolerance, for restarts of a fit that ended far from
 # the data
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
-# Initial, minimum and maximum damping, relative to the scales of the parameters
-_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1.0, 1e-6, 1e12
-# Factor on the damping after a good step, and factor after a poor step or after a good
-# step that follows a rejected one
-_EASED, _POOR = 0.1, 0.5
 
 
 def fit(
@@ -111,19 +89,20 @@ def fit(
     extras = problem.weighted(weights)
     fresh = point.states is problem.start.states
 
+    objective = Objective(problem, columns, extras, prior)
+
     def loosely():
-        loose = loosened(extras)
         most = max(iterations, _ITERATIONS)
-        return _descend(problem, columns, loose, point, prior, most).point
+        return descend(_loose(objective), point, most).point
 
     long = problem.longest_flight > _LONG and fresh and not already_loose(extras)
     first = loosely() if long else point
-    found = _descend(problem, columns, extras, first, prior, iterations, stop, progress)
+    found = descend(objective, first, iterations, stop, progress)
     # if the cost is far above the noise, there may be a better optimum; a caller who
     # gives `stop` or `start` has to search for it
     if fresh and stop is None and iterations > 0 and _far(problem, found, weights):
-        for other in _other_starts(problem, columns, extras, point, prior, loosely):
-            again = _descend(problem, columns, extras, other, prior, iterations)
+        for other in _other_starts(objective, point, loosely):
+            again = descend(objective, other, iterations)
             if np.isfinite(again.cost) and not again.cost >= found.cost:
                 found = again
             if not _far(problem, found, weights):
@@ -131,24 +110,17 @@ def fit(
     return finish(problem, columns, *found, prior=prior, weights=weights)
 
 
-class _Descent(NamedTuple):
-    """The end point of an iteration and the reason it ended."""
-
-    point: Point
-    blocks: Blocks
-    costs: Costs
-    cost: float
-    optimal: bool
-    count: int
-    ended: str
-
-
-def _far(problem, found: _Descent, weights) -> bool:
+def _far(problem, found: Descent, weights) -> bool:
     costs = jax.device_get(found.costs)
     return not np.isfinite(found.cost) or bool(far_from_data(problem, costs, weights))
 
 
-def _other_starts(problem, columns, extras, point, prior, loosely):
+def _loose(objective: Objective) -> Objective:
+    """Return the objective with loose joints within flights."""
+    return dataclasses.replace(objective, extras=loosened(objective.extras))
+
+
+def _other_starts(objective: Objective, point: Point, loosely: Callable[[], Point]):
     """Yield other starting points for a fit that ended far from the data.
 
     Each is the result of a fit with loose joints, first from the given point, then with
@@ -156,101 +128,19 @@ def _other_starts(problem, columns, extras, point, prior, loosely):
     has many local minima.
     """
     yield loosely()
-    loose = loosened(extras)
+    problem = objective.problem
     values = np.asarray(point.values)
     for factor in _FACTORS:
         moved = np.array(values)
-        for p in set(columns.parameter.tolist()):
+        for p in set(objective.columns.parameter.tolist()):
             one = problem.parameters[p]
             if math.isfinite(one.tolerance):
                 continue
             moved[:, p] = np.clip(factor * values[:, p], one.lower, one.upper)
         if not np.array_equal(moved, values):
-            start = own_states(
-                problem.layout,
-                problem.pieces,
-                extras,
-                Point(jnp.asarray(moved), point.states),
-            )
-            yield _descend(problem, columns, loose, start, prior, _ITERATIONS).point
-
-
-def _descend(
-    problem, columns, extras, point, prior, iterations, stop=None, progress=None
-):
-    """Iterate damped scoring from a point to an optimum near it."""
-    local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
-
-    def linearise(point):
-        return assemble(problem.layout, problem.pieces, extras, point, local, scales)
-
-    def total(costs, point):
-        return total_cost(costs, extras) + prior_cost(problem, columns, point, prior)
-
-    blocks, costs = linearise(point)
-    cost = total(costs, point)
-    damping, message, optimal, count = _FIRST_DAMPING, "", False, 0
-    so_far = [cost]
-    # factor on the damping after the next good step; number of steps rejected since the
-    # last accepted one
-    eased, raised = _EASED, 0
-    while count < iterations:
-        count += 1
-        step, promise = damped_step(problem, columns, blocks, point, damping, prior)
-        fine = np.isfinite(promise)
-        if fine and promise < PROMISE:
-            # in a valley, a damped step always predicts little gain; the undamped step
-            # must predict little gain as well
-            _, whole = damped_step(
-                problem, columns, blocks, point, _LEAST_DAMPING, prior
-            )
-            if not whole > _GRADIENT or damping <= _LEAST_DAMPING:
-                optimal, message = True, "The optimum was reached."
-                break
-            if damping <= 1e-1:
-                damping = max(0.1 * damping, _LEAST_DAMPING)
-        found, changed, value = blocks, costs, np.inf
-        if fine:
-            found, changed = linearise(step)
-            value = total(changed, step)
-        excess = np.inf
-        for _ in range(_CORRECTIONS):
-            # in a curved, steep valley, a long step ends on the slope: it is assessed
-            # after corrections, as long as these lead back into the valley quickly
-            if value <= cost or not value - cost < _LEADS_BACK * excess:
-                break
-            excess = value - cost
-            step, _ = damped_step(problem, columns, found, step, damping, prior)
-            found, changed = linearise(step)
-            value = total(changed, step)
-        if value <= cost and np.isfinite(value):
-            gained = (cost - value) / max(promise, 1e-300)
-            point, blocks, costs, cost = step, found, changed, value
-            good = gained > 0.5
-            damping = max(damping * (eased if good else _POOR), _LEAST_DAMPING)
-            eased, raised = (_EASED if good and not raised else _POOR), 0
-            if progress is not None:
-                progress(count, cost)
-        else:
-            raised += 1
-            damping *= 10**raised
-            eased = _POOR
-            if damping > _MOST_DAMPING:
-                message = (
-                    "No further step improves the fit, although it is not at an "
-                    "optimum; check the residuals, or start from other values."
-                )
-                break
-        so_far.append(cost)
-        if stop is not None and stop(so_far):
-            message = f"The fit was stopped after {count} iterations."
-            break
-    else:
-        message = (
-            f"The optimum was not reached in {iterations} iterations; allow more "
-            "iterations, or start closer to it."
-        )
-    return _Descent(point, blocks, costs, cost, optimal, count, message)
+            at = Point(jnp.asarray(moved), point.states)
+            start = own_states(problem.layout, problem.pieces, objective.extras, at)
+            yield descend(_loose(objective), start, _ITERATIONS).point
 
 
 def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:

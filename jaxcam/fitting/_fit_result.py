@@ -254,10 +254,7 @@ def finish(
     known = np.diag(prior_information(problem, columns, prior))
     information = information + known
     size = len(columns.scale)
-    labels = [
-        problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
-        for p, r in zip(columns.parameter, columns.record)
-    ]
+    labels = columns.labels(problem)
     blind: tuple[Unconstrained, ...] = ()
     covariance = np.full((size, size), np.nan)
     if np.all(np.isfinite(information)):

@@ -3,13 +3,12 @@
 import dataclasses
 from collections.abc import Iterable
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ._fit import fit
 from ._fit_result import Fit
-from .engine import assemble, free_columns, Problem, reduced
+from .engine import free_columns, linearised, Problem, reduced
 
 
 # a combination is identifiable if the data reduce its error to this fraction of the
@@ -159,14 +158,7 @@ def identify(
     """
     columns = free_columns(problem, names)
     at = at or fit(problem, free=())
-    blocks, _ = assemble(
-        problem.layout,
-        problem.pieces,
-        problem.extras,
-        at.point,
-        jnp.asarray(columns.local),
-        jnp.asarray(columns.scales),
-    )
+    blocks, _ = linearised(problem, columns, problem.extras, at.point)
     information, _ = reduced(columns, blocks)
     if not np.all(np.isfinite(information)):
         raise ValueError(
@@ -187,13 +179,15 @@ def identify(
         spread = np.where(dead & (directions**2 < _ROUNDING), 0.0, directions**2)
         weighted = np.where(spread > 0, spread * stderr[:, None] ** 2, 0.0)
         together = np.sqrt(np.sum(weighted, axis=0))
-    labels = tuple(
-        problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
-        for p, r in zip(columns.parameter, columns.record)
-    )
     held = np.asarray(at.point.values)[np.maximum(columns.record, 0), columns.parameter]
     return Identifiability(
-        labels, directions, stderr, held, columns.scale, alone, together
+        columns.labels(problem),
+        directions,
+        stderr,
+        held,
+        columns.scale,
+        alone,
+        together,
     )
 
 

@@ -141,6 +141,12 @@ class ImpactLaw:
                 f"The bodies separate {r:.2f} times as fast as they approach; check "
                 f"whether the columns before and after are interchanged."
             )
+        lost = [name for name, law in self.laws.items() if not law.converged]
+        if lost:
+            found.append(
+                f"The fit of the {' and the '.join(lost)} law did not converge; check "
+                f"the impacts in the table, or add more."
+            )
         if self.momentum is not None:
             found.append(self.momentum.sentence())
         return found

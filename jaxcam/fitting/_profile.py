@@ -81,7 +81,8 @@ def profile(
 
     Raises:
         KeyError: The parameter was not fitted.
-        ValueError: The parameter differs from recording to recording.
+        ValueError: The parameter differs from recording to recording; or its standard
+            error is not finite, and `values` is not given.
 
     Examples:
         >>> from jaxcam.fitting import profile
@@ -93,6 +94,11 @@ def profile(
     problem, others = found.problem, [n for n in found.free if n != name]
     parameter = problem.parameter(name)
     if values is None:
+        if not np.isfinite(estimate.stderr):
+            raise ValueError(
+                f"The standard error of {name!r} is {estimate.stderr}, so it gives no "
+                "range to profile; give the `values` at which to fix the parameter."
+            )
         offsets = np.linspace(-reach, reach, points | 1)
         tried = estimate.value + offsets * estimate.stderr
     else:

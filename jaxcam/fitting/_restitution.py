@@ -20,6 +20,9 @@ from .engine import Model, Turning
 
 # Residuals beyond this many standard errors count linearly, not quadratically (Huber)
 _HUBER = 3.0
+# Largest decrease of the cost predicted for a further step at an optimum: such a step
+# changes no parameter by more than a tenth of its standard error
+_GRADIENT = 1e-2
 # Runge-Kutta steps of one flight
 _STEPS = 200
 
@@ -54,18 +57,24 @@ class RestitutionFit:
     """Number of impacts minus number of parameters; `cost / freedom` is about 1 if the
     law explains all impacts.
     """
+    converged: bool
+    """Whether the fit ended at an optimum. If not, `values` and `stderr` mean nothing.
+    """
 
     def sentence(self) -> str:
-        """Return the law in words."""
+        """Return the law in words, and whether its fit failed."""
         parts = ", ".join(
             f"{n} = {v:.5g} +- {e:.1g}"
             for n, v, e in zip(self.names, self.values, self.stderr)
         )
         ratio = self.cost / max(1, self.freedom)
-        return (
+        found = (
             f"{type(self.law).__name__}: {parts}; the residual is {ratio:.2f} times "
             f"the noise for {self.freedom + len(self.names)} impacts."
         )
+        if self.converged:
+            return found
+        return f"{found} This fit did not converge; start it from other values."
 
 
 def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
@@ -183,17 +192,22 @@ def fit_rows(
     """
     names = tuple(names)
     start = np.array([float(getattr(law, name)) for name in names])
-    found, _ = _solve(law, names, jnp.asarray(start), jnp.asarray(data))
-    rows, off = _normal(law, names, found, jnp.asarray(data))
-    covariance = np.linalg.inv(np.asarray(rows).T @ np.asarray(rows))
+    found = _solve(law, names, jnp.asarray(start), jnp.asarray(data))
+    rows, off = map(np.asarray, _normal(law, names, found, jnp.asarray(data)))
+    covariance = np.linalg.inv(rows.T @ rows)
+    # the verdict of the optimiser is about the last step, which may be small because
+    # the steps before it failed
+    score = rows.T @ off
+    promise = score @ covariance @ score
     values = np.asarray(found)
     return RestitutionFit(
         _with(law, names, jnp.asarray(values)),
         names,
         values,
         np.sqrt(np.diag(covariance)),
-        float(np.sum(np.asarray(off) ** 2)),
+        float(np.sum(off**2)),
         int(data.shape[1] - len(names)),
+        bool(promise < _GRADIENT),
     )
 
 
@@ -231,7 +245,7 @@ def _solve(law, names, start, data):
 
     solver = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12)
     found = optx.least_squares(loss, solver, start, data, max_steps=200, throw=False)
-    return found.value, found.result
+    return found.value
 
 
 @program

@@ -3,16 +3,15 @@
 import dataclasses
 from collections.abc import Iterable
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ._fit_result import Fit
 from .engine import (
-    assemble,
     Columns,
     free_columns,
     invert_information,
+    linearised,
     off_nominal,
     prior_information,
     Problem,
@@ -111,19 +110,10 @@ def linearise(
         ('gravity',)
     """
     columns = free_columns(problem, None)
-    blocks, _ = assemble(
-        problem.layout,
-        problem.pieces,
-        problem.weighted(weights),
-        found.point,
-        jnp.asarray(columns.local),
-        jnp.asarray(columns.scales),
-    )
+    extras = problem.weighted(weights)
+    blocks, _ = linearised(problem, columns, extras, found.point)
     information, score = reduced(columns, blocks)
-    names = tuple(
-        problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
-        for p, r in zip(columns.parameter, columns.record)
-    )
     strength = prior_information(problem, columns, prior)
     score = score - strength * off_nominal(problem, columns, found.point)
+    names = columns.labels(problem)
     return Linearised(problem, names, columns, information, score, strength)

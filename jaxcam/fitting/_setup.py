@@ -112,7 +112,7 @@ class Setup:
         """Return recordings segmented at the gaps of the system; existing segments are
         kept.
 
-        `progress` is called with the fraction of recordings completed.
+        `progress` is called with the completed fraction of the recordings to segment.
 
         Raises:
             RecordingError: A channel is missing, or a gap is not measured by any
@@ -124,17 +124,19 @@ class Setup:
             else self._with_known(run)
             for run in recordings
         )
-        cut = tuple(run for run in runs if isinstance(run, Segments))
-        if len(cut) == len(runs):
-            return cut
-        whole = [run.recording if isinstance(run, Segments) else run for run in runs]
-        return segment_by_model(
-            self.model,
-            whole,
-            self.parameters,
-            drive_channel=self.drive_channel,
-            progress=progress,
+        uncut = [run for run in runs if isinstance(run, Recording)]
+        if not uncut:
+            return tuple(run for run in runs if isinstance(run, Segments))
+        cut = iter(
+            segment_by_model(
+                self.model,
+                uncut,
+                self.parameters,
+                drive_channel=self.drive_channel,
+                progress=progress,
+            )
         )
+        return tuple(run if isinstance(run, Segments) else next(cut) for run in runs)
 
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
         """Return the fitting problem of recordings, segmented or not.

@@ -1,28 +1,12 @@
 """Convert names of channels to labels with units."""
 
+from ..recordings.files import unit_of, without_unit
 from .labels import labelled
-
-
-# endings of channel names, and the notation of their units; the longest ending wins
-_ENDINGS = {
-    "_rad_s2": "rad/s²",
-    "_rad_s": "rad/s",
-    "_m_s2": "m/s²",
-    "_m_s": "m/s",
-    "_rad": "rad",
-    "_m": "m",
-    "_s": "s",
-    "_N": "N",
-    "_V": "V",
-}
 
 
 def name_and_unit(channel: str) -> tuple[str, str]:
     """Split a name: `follower_angle_rad` becomes "follower angle" and "rad"."""
-    for ending, unit in _ENDINGS.items():
-        if channel.endswith(ending) and len(channel) > len(ending):
-            return channel.removesuffix(ending).replace("_", " "), unit
-    return channel.replace("_", " "), "-"
+    return without_unit(channel), unit_of(channel).replace("^2", "²") or "-"
 
 
 def channel_label(channel: str) -> str:

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from scipy.stats import norm
 
 from ..recordings.against_model import Comparison, Residuals
+from ..recordings.files import without_unit
 from ..tables import scaled
 from ._axes import several_axes
-from ._channels import name_and_unit
 from ._style import BAND, FLIGHT, styled
 from .labels import labelled
 
@@ -131,7 +131,7 @@ def _draw_row(left: Axes, right: Axes, parts, colours, against) -> float:
     left.set_ylim(-limit, limit)
     left.set_ylabel(labelled("residual", unit))
     left.set_title(
-        f"{_title(parts[0])}: {factor * rms:.3g} {unit} rms, "
+        f"{_title(parts[0])}: {f'{factor * rms:.3g} {unit}'.rstrip()} rms, "
         f"noise {factor * noise:.2g}",
         fontsize="medium",
     )
@@ -206,5 +206,5 @@ def _name_records(figure: Figure, colours: dict[str, str]) -> None:
 
 def _title(part: Residuals) -> str:
     # contacts and impacts refer to the segmented channel; only flights may have several
-    channel = name_and_unit(part.channel)[0]
+    channel = without_unit(part.channel)
     return f"{part.mode}, {channel}" if part.mode == "flight" else part.mode

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ._errors import RecordingError
 
@@ -37,6 +37,10 @@ class Recording:
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Known constants of this recording, keyed by the names of the system's fields:
     `{"mass": 0.31}`. A fit does not change them.
+    """
+    filled: Bool[np.ndarray, " k"] | None = None
+    """Samples that `mend` interpolated, shape `(k,)`: they keep the sampling uniform,
+    but no fit uses them. `None` if there are none.
     """
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " k"]:
@@ -79,7 +83,10 @@ class Recording:
                 f"{self.time[-1]:g} s."
             )
         channels = {name: samples[keep] for name, samples in self.channels.items()}
-        return dataclasses.replace(self, time=self.time[keep], channels=channels)
+        filled = None if self.filled is None else self.filled[keep]
+        return dataclasses.replace(
+            self, time=self.time[keep], channels=channels, filled=filled
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,9 +107,17 @@ class Case:
         return len(self.recordings)
 
     def __getitem__(self, index: int | str) -> Recording:
-        """Return a recording by its index, or by the start of its name (`"run4"`)."""
+        """Return a recording by its index, its name, or the start of its name
+        (`"run4"`).
+
+        Raises:
+            RecordingError: The name is none of them, and not the start of exactly one.
+        """
         if isinstance(index, int):
             return self.recordings[index]
+        same = [run for run in self.recordings if run.name == index]
+        if same:
+            return same[0]
         found = [run for run in self.recordings if run.name.startswith(index)]
         if len(found) != 1:
             names = _listed(run.name for run in self.recordings)

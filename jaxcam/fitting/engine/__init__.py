@@ -6,6 +6,7 @@ from ._columns import (
     held_firmer as held_firmer,
     inside as inside,
     invert_information as invert_information,
+    linearised as linearised,
     off_nominal as off_nominal,
     prior_cost as prior_cost,
     prior_information as prior_information,
@@ -20,7 +21,11 @@ from ._eliminate import (
 from ._event_limit import crowded_pieces as crowded_pieces
 from ._known_constants import with_constants as with_constants
 from ._layout import Layout as Layout
-from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
+from ._linear import (
+    Extras as Extras,
+    linear_pieces as linear_pieces,
+    LinearPieces as LinearPieces,
+)
 from ._linearise import (
     assemble as assemble,
     Blocks as Blocks,

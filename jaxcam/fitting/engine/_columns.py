@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ._eliminate import eliminate_states, LEAST
-from ._linearise import Blocks, Point
+from ._linear import Extras
+from ._linearise import assemble, Blocks, Costs, Point
 from ._parameter import Parameter
 from ._problem import Problem
 from ._sharpness import shared_width
@@ -40,6 +41,15 @@ class Columns:
     def scales(self) -> Float[np.ndarray, "r m"]:
         padded = np.append(self.scale, 0.0)
         return padded[self.place]
+
+    def labels(self, problem: Problem) -> tuple[str, ...]:
+        """Return the name of each free value: that of its parameter, with `@record` if
+        each recording has its own value.
+        """
+        return tuple(
+            problem.names[p] if r < 0 else f"{problem.names[p]}@{problem.records[r]}"
+            for p, r in zip(self.parameter, self.record)
+        )
 
 
 def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
@@ -87,6 +97,25 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
         place,
         np.array(scale, dtype=float),
     )
+
+
+def linearised(
+    problem: Problem, columns: Columns, extras: Extras, point: Point
+) -> tuple[Blocks, Costs]:
+    """Return the normal equations of the free values about a point, and the costs.
+
+    Args:
+        problem: The problem.
+        columns: The free values.
+        extras: Further arguments of the compiled programs, such as those from
+            `Problem.weighted`.
+        point: The point.
+
+    Returns:
+        Normal equations and costs, as from `assemble`.
+    """
+    local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
+    return assemble(problem.layout, problem.pieces, extras, point, local, scales)
 
 
 def reduced(columns: Columns, blocks: Blocks):

@@ -110,7 +110,7 @@ def spans(
     """
     record = segments.recording
     time, interval = record.time, record.interval
-    valid = ~np.asarray(record.meta.get("filled", np.zeros(len(time), bool)))
+    valid = np.ones(len(time), bool) if record.filled is None else ~record.filled
     flown: list[Span] = []
     curved = (segments.channel,) if curved is None else curved
     noises = {name: measured_noise(record[name]) for name in curved}

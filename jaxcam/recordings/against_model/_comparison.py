@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from rich.table import Table
 
+from .._units import without_unit
+
 
 @dataclasses.dataclass(frozen=True)
 class Residuals:
@@ -21,7 +23,7 @@ class Residuals:
     channel: str
     """The channel."""
     unit: str
-    """Unit of the differences."""
+    """Unit of the differences, empty if the channel's name states none."""
     time: Float[np.ndarray, " k"]
     """Time in the recording (s)."""
     turned: Float[np.ndarray, " k"]
@@ -113,7 +115,7 @@ class Comparison:
         table.add_column("most significant at")
         for row in self.rows:
             table.add_row(
-                f"{row.mode} of {_plain_channel(row)}" if several else row.mode,
+                f"{row.mode} of {without_unit(row.channel)}" if several else row.mode,
                 row.unit,
                 str(row.count),
                 f"{row.rms:.1e}",
@@ -211,19 +213,13 @@ _PLACES = {
 
 
 def _words(row: Row) -> str:
-    channel = f"the {_plain_channel(row)}"
+    channel = f"the {without_unit(row.channel)}"
     start = _PLACES[row.mode].format(channel=channel, ratio=f"{row.ratio:.1f}")
-    size = f" ({row.rms:.1e} {row.unit} rms over {row.count} {_plural(row)})"
+    size = f" ({row.rms:.1e} {row.unit}".rstrip()
+    size += f" rms over {row.count} {_plural(row)})"
     # pure noise also has a most significant place, which is not reported
     where = f", most clearly in {_place(row)}" if row.ratio > 1.15 else ""
     return start + size + where
-
-
-def _plain_channel(row: Row) -> str:
-    for ending in ("_rad_s", "_m_s", "_rad", "_m"):
-        if row.channel.endswith(ending):
-            return row.channel.removesuffix(ending).replace("_", " ")
-    return row.channel.replace("_", " ")
 
 
 def _plural(row: Row) -> str:

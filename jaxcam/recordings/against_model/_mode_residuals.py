@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...hybrid.programs import program
+from .._units import unit_of
 from ..cut import Flight, padded, Segments
 from ._comparison import Residuals
 from ._flight_fit import fit_flights, observed, rate_of, size_of, state_at
@@ -71,7 +72,7 @@ def in_flight(system, segments, observe, noise, clock):
                 recording.name,
                 "flight",
                 channel,
-                _unit(channel),
+                unit_of(channel),
                 recording.time[every],
                 _turned(segments)[every],
                 np.concatenate(values),
@@ -90,10 +91,8 @@ def in_contact(system, segments, pick, clock) -> list[Residuals]:
     the model's surface.
     """
     time = segments.recording.time
-    kept = [
-        (i, np.flatnonzero((time >= part.settled) & (time < part.stop.time)))
-        for i, part in enumerate(segments.contacts)
-    ]
+    contacts = enumerate(segments.contacts)
+    kept = [(i, np.flatnonzero(segments.resting(part))) for i, part in contacts]
     kept = [(i, rows) for i, rows in kept if len(rows)]
     if not kept:
         return []
@@ -107,7 +106,7 @@ def in_contact(system, segments, pick, clock) -> list[Residuals]:
             segments.recording.name,
             "contact",
             segments.channel,
-            _unit(segments.channel),
+            unit_of(segments.channel),
             time[rows],
             _turned(segments)[rows],
             _distance(system, pick, clock[rows], state),
@@ -134,7 +133,7 @@ def at_impacts(system, segments, pick, clock) -> list[Residuals]:
         found.after_stderr[sharp],
         np.asarray(gain)[:count] * found.before_stderr[sharp],
     )
-    unit = _unit(segments.channel)
+    unit = unit_of(segments.channel)
     turned = found.turned[sharp]
     number = np.flatnonzero(sharp)
     speed = found.after[sharp] - np.asarray(after)[:count]
@@ -155,7 +154,7 @@ def at_impacts(system, segments, pick, clock) -> list[Residuals]:
             *head,
             "impact speed",
             segments.channel,
-            f"{unit}/s",
+            unit and f"{unit}/s",
             moment,
             turned,
             speed,
@@ -223,10 +222,3 @@ def _turned(segments: Segments) -> np.ndarray:
     if segments.drive is None:
         return np.full(len(segments.recording), np.nan)
     return segments.drive.angle
-
-
-def _unit(channel: str) -> str:
-    for ending, unit in (("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_rad", "rad")):
-        if channel.endswith(ending):
-            return unit
-    return channel.rpartition("_")[2]

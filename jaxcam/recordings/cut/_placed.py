@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from ._kinks import find_kinks, WINDOW
+from ._jump_point import jump_point
+from ._kinks import find_kinks
 from ._motion import Motion
-from ._polynomial import crossing, fit_local
 
 
 # Impacts further from the median position than this many standard errors are ignored
@@ -25,20 +25,12 @@ def placed(motion: Motion, tolerance: float) -> Motion:
     **Returns:** the unchanged motion if no jump is within the tolerance.
     """
     time, samples = motion.time, motion.samples
-    reach = max(6, round(WINDOW / motion.interval))
     found = []
     for kink in find_kinks(samples, motion.interval, motion.noise):
-        # the sample next to the impact may belong to either side
-        left = slice(max(0, kink - 1 - reach), kink - 1)
-        right = slice(kink + 1, kink + 1 + reach)
-        origin = float(time[kink] - motion.interval / 2)
-        before = fit_local(time[left], samples[left], motion.noise, origin)
-        after = fit_local(time[right], samples[right], motion.noise, origin)
-        moment, _ = crossing(before, after, origin, 3 * motion.interval)
-        off = before.value(moment) - np.interp(moment, time, motion.contact)
-        error = before.value_stderr(moment) + after.value_stderr(moment)
-        if abs(off) < tolerance + _OUTLIER * error:
-            found.append((off, error))
+        impact = jump_point(time, samples, kink, motion.interval, motion.noise)
+        off = impact.before - np.interp(impact.time, time, motion.contact)
+        if abs(off) < tolerance + _OUTLIER * impact.stderr:
+            found.append((off, impact.stderr))
     if not found:
         return motion
     off, error = np.array(found).T

@@ -16,9 +16,9 @@ class Boundary:
     """The boundary between one part and the next."""
 
     time: float
-    """Time (s), NaN at the ends of the recording."""
+    """Time (s)."""
     stderr: float
-    """Standard error of `time` (s)."""
+    """Standard error of `time` (s), NaN at the ends of the recording."""
     kind: str
     """`"impact"` (flight to flight), `"several impacts"` (too close together to be
     distinguished), `"landing"` (flight to contact, with impacts too weak to be

@@ -18,9 +18,9 @@ from ._bend import bend_sizes, Seen, WAVES
 from ._contact_stretches import stretches
 from ._firm_contact import firm_contact
 from ._hidden_hops import pressed
+from ._jump_point import jump_point
 from ._kinks import find_kinks
 from ._padding import padded
-from ._polynomial import crossing, fit_local
 from ._surface import (
     linearise,
     nominal_surface,
@@ -171,20 +171,13 @@ def _impact_points(recording, drive, channel, noise, sure):
     interval = recording.interval
     kinks = find_kinks(samples, interval, noise)
     turned, angle, error = [], [], []
-    reach = max(6, round(0.01 / interval))
     for kink in kinks:
-        # the sample next to the impact may belong to either side
-        left = slice(max(0, kink - 1 - reach), kink - 1)
-        right = slice(kink + 1, kink + 1 + reach)
-        origin = float(time[kink] - interval / 2)
-        before = fit_local(time[left], samples[left], noise, origin)
-        after = fit_local(time[right], samples[right], noise, origin)
-        moment, _ = crossing(before, after, origin, 3 * interval)
-        if abs(moment - origin) >= 3 * interval:
+        impact = jump_point(time, samples, kink, interval, noise)
+        if not impact.close:
             continue
-        turned.append(np.interp(moment, time, drive.angle))
-        angle.append(0.5 * (before.value(moment) + after.value(moment)))
-        error.append(before.value_stderr(moment) + after.value_stderr(moment))
+        turned.append(np.interp(impact.time, time, drive.angle))
+        angle.append(0.5 * (impact.before + impact.after))
+        error.append(impact.stderr)
     if len(kinks) == 0:
         # a recording without impacts is either in permanent contact, or gives no
         # information

@@ -1,6 +1,7 @@
 """Read recordings and rigs from files, with units and precise error messages."""
 
 from .._recording import Case as Case
+from .._units import si as si, unit_of as unit_of, without_unit as without_unit
 from ._check import check_channels as check_channels, check_drive as check_drive
 from ._choose import Columns as Columns
 from ._mend import mend as mend, Mended as Mended
@@ -27,4 +28,3 @@ from ._toml import (
     Section as Section,
     shown_value as shown_value,
 )
-from ._units import si as si, unit_of as unit_of

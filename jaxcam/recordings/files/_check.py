@@ -97,14 +97,12 @@ def check_drive(recording: Recording) -> None:
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed
-    if angle is None:
+    if angle is None or nominal is None:
         return
     wrapped = np.abs(np.diff(angle)) > np.pi
     if np.any(wrapped):
         angle = np.unwrap(angle)
     speed = float(angle[-1] - angle[0]) / recording.duration
-    if nominal is None:
-        return
     ratio = abs(speed) / nominal if nominal > 0 else np.inf
     looks = {
         180 / np.pi: f"`cam_angle_rad` looks like degrees; {_DEGREES}",

@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Float
 
 from .._errors import RecordingError
+from .._units import si
 from ._excel import read_excel
 from ._mat import read_mat
 from ._parquet import read_parquet
 from ._source import listed, shown, Source
 from ._table import LEFT_OUT, read_table
-from ._units import si
 
 
 Columns: TypeAlias = Sequence[str] | Mapping[str, str | tuple[str, float]]

@@ -17,8 +17,8 @@ _BRIDGE = 4
 class Mended:
     """Pieces of a repaired recording, and the repairs as text.
 
-    Interpolated samples are marked in `meta["filled"]` of each piece: they keep the
-    sampling uniform, but no fit uses them.
+    Interpolated samples are marked in `filled` of each piece: they keep the sampling
+    uniform, but no fit uses them.
     """
 
     recordings: tuple[Recording, ...]
@@ -151,13 +151,17 @@ def _even(recording: Recording, rows, name: str, interval: float) -> Recording:
     ticks = np.maximum(np.round(np.diff(time) / interval).astype(int), 1)
     places = np.concatenate([[0], np.cumsum(ticks)])
     count = places[-1] + 1
+    # the recording may have been mended before
+    before = None if recording.filled is None else recording.filled[rows]
     if count == len(rows):
         channels = {c: v[rows] for c, v in recording.channels.items()}
-        return dataclasses.replace(recording, name=name, time=time, channels=channels)
+        return dataclasses.replace(
+            recording, name=name, time=time, channels=channels, filled=before
+        )
     from scipy.interpolate import PchipInterpolator
 
     filled = np.ones(count, dtype=bool)
-    filled[places] = False
+    filled[places] = False if before is None else before
     even = np.interp(np.arange(count), places, time)
     channels = {
         c: np.asarray(PchipInterpolator(time, v[rows])(even))
@@ -165,7 +169,6 @@ def _even(recording: Recording, rows, name: str, interval: float) -> Recording:
     }
     for c, v in recording.channels.items():
         channels[c][places] = v[rows]
-    meta = {**recording.meta, "filled": filled}
     return dataclasses.replace(
-        recording, name=name, time=even, channels=channels, meta=meta
+        recording, name=name, time=even, channels=channels, filled=filled
     )

@@ -101,7 +101,7 @@ def read_recordings(
 def read_recording(
     file: str | Path,
     *,
-    channels: Sequence[str] = CAM_FOLLOWER,
+    channels: Sequence[str] = (),
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> Recording:
@@ -123,7 +123,7 @@ def read_recording(
         >>> from pathlib import Path
         >>> from jaxcam.recordings import read_recording
         >>> _ = Path("run.csv").write_text("time_s,angle_deg\n0.0,0\n0.1,90\n0.2,180\n")
-        >>> run = read_recording("run.csv", channels=())
+        >>> run = read_recording("run.csv")
         >>> run.channels["angle_rad"].round(3).tolist()
         [0.0, 1.571, 3.142]
     """
@@ -134,7 +134,7 @@ def read_recording(
 def read_case(
     folder: str | Path,
     *,
-    channels: Sequence[str] = CAM_FOLLOWER,
+    channels: Sequence[str] = (),
     split: str | None = None,
     gaps: Literal["refuse", "split", "mend"] = "refuse",
     columns: Columns | None = None,
@@ -148,7 +148,7 @@ def read_case(
 
     Args:
         folder: The folder.
-        channels: Required columns (SI names); `()` for rigs other than a cam-follower.
+        channels: Required columns (SI names).
         split: Column with the recording number, for a file with several recordings.
         gaps: Handling of a recording with missing samples: `"refuse"` raises an error,
             `"split"` cuts it into pieces, `"mend"` repairs it (see `mend`).

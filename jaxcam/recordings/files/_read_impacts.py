@@ -7,9 +7,9 @@ import numpy as np
 
 from .._errors import RecordingError
 from .._impact_table import Bodies, ImpactTable
+from .._units import unit_of
 from ._choose import column_names, Columns, read_columns
 from ._source import listed
-from ._units import unit_of
 
 
 _SPEED = re.compile(r"(before|after)([12]?)(_stderr)?_(m_s|rad_s)")
