@@ -74,6 +74,8 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         # nodes of a force in a piece of flight
         "_NODES",
         "_SLOWEST",
+        # step of finite differences
+        "_CHANGE",
         "_LOOKS",
         "_KNOTS",
         "_MARGIN",

@@ -28,6 +28,7 @@ from .search import (
     system_question,
     Trial,
     Trials,
+    with_fitted_speed,
     with_model_error,
 )
 from .terms import Location
@@ -193,6 +194,13 @@ def _answered(
     trials = conditions.trials(question, keep)
     search = Search(trials)
     best = search.run()
+    sharper = with_fitted_speed(question, trials, best)
+    if sharper is not None:
+        question = sharper
+        folder = None if keep is None else keep / "with_fitted_speed"
+        trials = conditions.trials(question, folder)
+        search = Search(trials)
+        best = search.run()
     bare, rough = trials.known[frozenset()], None
     far = far_from_data(bare.fit, best.fit, policy)
     # an odd recording is no missing physics: the diagnosis is repeated without it

@@ -1,5 +1,6 @@
 """Report an effect: its parameters, its location and the evidence."""
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
@@ -9,7 +10,7 @@ from scipy.stats import chi2
 from ...fitting import Fit
 from ..evidence import Choice, Needs, Ripple, Shares
 from ..policy import Policy
-from ..search import Blocks, blocks_of, Missing, Trials, values_of
+from ..search import Blocks, blocks_of, FittedSpeed, Missing, Trials, values_of
 from ..terms import DriveRipple, Term, Value
 from ._diagnosis import Effect, Verdict
 from ._missing import MissingFunction, sentence_of
@@ -45,6 +46,20 @@ def term_effects(
             )
         )
     return found
+
+
+def with_speed(effect: Effect, found: FittedSpeed | None) -> Effect:
+    """Return an effect with its fitted reference speed, `v0`, if it has one."""
+    if found is None or found.term != effect.name:
+        return effect
+    parameters = {
+        name: dataclasses.replace(
+            one, stderr=math.hypot(one.stderr, found.errors.get(name, 0.0))
+        )
+        for name, one in effect.parameters.items()
+    }
+    parameters["v0"] = found.speed
+    return dataclasses.replace(effect, parameters=parameters)
 
 
 def missing_effects(
@@ -123,7 +138,7 @@ def _of_term(
         sentence=term.sentence,
         parameters=term.reported(parameters),
         where=term.where,
-        region=term.region,
+        region=term.described(),
         records=_seen_in(blocks, found, [one.name for one in strengths], policy),
         delta_bic=delta_bic,
         heldout_gain_nats=gained,

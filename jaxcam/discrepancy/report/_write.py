@@ -45,6 +45,7 @@ from ._effects import (
     missing_effects,
     term_effects,
     unknown_effect,
+    with_speed,
 )
 from ._missing import missing_functions, named_function
 from ._summary import summary_of, summary_of_functions
@@ -70,7 +71,10 @@ def diagnosis_of(
             ripple,
         )
     divided = _shares_of(trials, choice)
-    effects = term_effects(trials, choice, divided.of)
+    effects = [
+        with_speed(effect, question.fitted_speed)
+        for effect in term_effects(trials, choice, divided.of)
+    ]
     if ripple is not None and ripple.significant(len(trials.terms) + 1, policy):
         effects.append(drive_effect(ripple, policy))
     named = bool(effects)

@@ -27,9 +27,11 @@ from ._model_error import (
 from ._named_terms import with_terms as with_terms
 from ._question import (
     Candidates as Candidates,
+    FittedSpeed as FittedSpeed,
     Question as Question,
     Report as Report,
 )
+from ._reference_speed import with_fitted_speed as with_fitted_speed
 from ._rig_question import rig_question as rig_question
 from ._roughness import occam as occam, Roughness as Roughness, roughness as roughness
 from ._search import Search as Search

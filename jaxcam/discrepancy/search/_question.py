@@ -12,7 +12,7 @@ from ...fitting import Parameter, Problem, Sensor
 from ...recordings import Recording, RecordingError, References
 from ...recordings.cut import least_noise, Segments
 from ..policy import Policy
-from ..terms import Location, SensorTerm, Term, Where
+from ..terms import Location, SensorTerm, Term, Value, Where
 
 
 Candidates: TypeAlias = Sequence[Term] | Literal["extended"] | None
@@ -28,6 +28,16 @@ class Shown(NamedTuple):
     name: str
     divisor: float
     unit: str
+
+
+class FittedSpeed(NamedTuple):
+    """The fitted reference speed of a term, and the standard errors of the strengths of
+    the term that result from the error of the speed.
+    """
+
+    term: str
+    speed: Value
+    errors: Mapping[str, float]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,6 +57,9 @@ class Question:
     - `looseness`: in that case, error of a joint relative to that of the state of a
         single piece.
     - `location`: coordinate and gap on which missing physics acts.
+    - `unstated`: names of the references that the rig does not state; `relisted`: a
+        function that returns the question with other references; `fitted_speed`: the
+        speed among them that was fitted.
     """
 
     problem: Problem
@@ -64,6 +77,9 @@ class Question:
     model_errors: tuple["ModelError", ...] = ()
     looseness: float = 1.0
     location: Location = Location()
+    unstated: tuple[str, ...] = ()
+    relisted: Callable[["Question", References], "Question"] | None = None
+    fitted_speed: FittedSpeed | None = None
 
 
 class Noisier(NamedTuple):

@@ -150,6 +150,19 @@ def system_question(
         references = references.sharper(slip / references.slip_speed)
         terms, unlisted = listed(references)
         problem = _with_terms(problem, terms)
+
+    def relisted(question: Question, references: References) -> Question:
+        terms, unlisted = listed(references)
+        return dataclasses.replace(
+            question,
+            problem=_with_terms(question.problem, terms),
+            terms=terms,
+            unlisted=unlisted,
+            references=references,
+        )
+
+    # given terms have the constants that they were given
+    free = candidates is None or isinstance(candidates, str)
     return Question(
         problem=problem,
         rig=tuple(p.name for p in inside),
@@ -160,6 +173,8 @@ def system_question(
         references=references,
         noisier=noisier,
         location=location,
+        unstated=tuple({"impact_speed"} - {*(stated or {})}) if free else (),
+        relisted=relisted,
         **_drives(recordings, drive_channel),
     )
 

@@ -17,7 +17,7 @@ from ._one_way import (
     FrictionBackwards,
     FrictionForwards,
 )
-from ._power_law import RestitutionPower
+from ._restitution import RestitutionPower, RestitutionVelocity
 from ._sensor_terms import SensorGain, SensorLag, SensorOffset
 from ._springs import (
     BilinearSpring,
@@ -118,26 +118,6 @@ class NonlinearSpring(Term):
 
     def acceleration(self, motion: Motion):
         return -self.k3 * (motion.position - self.center) ** 3
-
-
-class RestitutionVelocity(Term):
-    """Coefficient of restitution that decreases with approach speed v,
-    `r0 (1 + v / reference)^-rb`.
-    """
-
-    name: ClassVar[str] = "restitution_velocity"
-    sentence: ClassVar[str] = (
-        "a coefficient of restitution that depends on the approach speed"
-    )
-    where: ClassVar[str] = Where.IMPACT
-    region: ClassVar[str] = "at impacts, as a function of approach speed"
-    source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
-    rb: float = strength("-", 0.02, lower=0.0)
-    reference: float = _reference(References.impact_speed)
-
-    def restitution(self, approach, motion: Motion):
-        del motion
-        return jnp.exp(-self.rb * jnp.log1p(approach / self.reference))
 
 
 class CamProfileError(Term):

@@ -156,6 +156,9 @@ class Term(eqx.Module):
     """Literature reference."""
     listed: ClassVar[bool] = True
     """False for a term that only describes an unknown effect and is never a verdict."""
+    reference_speed: ClassVar[str] = ""
+    """Name of the speed in `References` that scales the form of the term, if any. A
+    speed that a rig file does not state is fitted once the term is named."""
     corner: ClassVar[bool] = False
     """Whether the force jumps, like dry friction, and is therefore smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
@@ -223,6 +226,10 @@ class Term(eqx.Module):
     def prepared(self) -> "Term":
         """Return the term with precomputed quantities that it needs at every step."""
         return self
+
+    def described(self) -> str:
+        """Return the part of the motion in which the term acts, in words."""
+        return self.region
 
     def exact(self) -> "Term":
         """Return the term for use outside a fit: its derivatives are exact instead of

@@ -1,0 +1,94 @@
+"""Fit the reference speed of a named term if the rig file does not state it."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ...fitting import Fit, fit
+from ..terms import Term, Value
+from ._question import FittedSpeed, Question
+from ._trials import Trial, Trials
+
+
+# relative change of the speed for second differences of the cost
+_CHANGE = 0.1
+
+
+def with_fitted_speed(
+    question: Question, trials: Trials, best: Trial
+) -> Question | None:
+    """Return the question with a fitted reference speed, or `None` if no named term has
+    an unstated one, or if another speed explains no more.
+
+    The speed is sought between the slowest impact and ten times the fastest one. Terms
+    with a frequency take no part, because they may only imitate the error of the form.
+    """
+    term = next((t for t in question.terms if _unstated(t, question, best)), None)
+    speeds = np.concatenate([p.impacts.approach for p in question.problem.segments])
+    speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
+    if term is None or question.relisted is None or not len(speeds):
+        return None
+    trials.progress("fitting the reference speed", None)
+    start = _with_strengths_only(trials, best)
+    if start is None:
+        return None
+    free, policy = trials.parameters(start.names), trials.policy
+    relisted = question.relisted
+
+    def with_speed(logarithm: float) -> Question:
+        speed = {term.reference_speed: math.exp(logarithm)}
+        return relisted(question, dataclasses.replace(question.references, **speed))
+
+    def fitted(logarithm: float) -> Fit:
+        problem, most = with_speed(logarithm).problem, policy.quick_iterations
+        return fit(problem, free=free, start=start.fit.point, iterations=most)
+
+    found: Any = minimize_scalar(
+        lambda logarithm: fitted(logarithm).cost,
+        bounds=(math.log(speeds.min()), math.log(10 * speeds.max())),
+        method="bounded",
+        options={"maxiter": policy.element_fits},
+    )
+    price = math.log(trials.problem.samples) + policy.tie
+    usual = fitted(math.log(getattr(question.references, term.reference_speed))).cost
+    if not found.fun + price < usual:
+        return None
+    near = [fitted(float(found.x) + change) for change in (-_CHANGE, 0.0, _CHANGE)]
+    return dataclasses.replace(
+        with_speed(float(found.x)), fitted_speed=_of_fits(term, float(found.x), near)
+    )
+
+
+def _unstated(term: Term, question: Question, best: Trial) -> bool:
+    """Return whether a term is named and has a reference speed that is not stated."""
+    return term.name in best.names and term.reference_speed in question.unstated
+
+
+def _with_strengths_only(trials: Trials, best: Trial) -> Trial | None:
+    """Return the fit of those terms of a subset that have no inner parameters."""
+    names = frozenset(
+        name
+        for name in best.names
+        if not any(one.inner for one in trials.term(name).strengths())
+    )
+    return trials.known.get(names) or trials.attempt(names, best)
+
+
+def _of_fits(term: Term, logarithm: float, near: list[Fit]) -> FittedSpeed:
+    """Return a fitted speed with its standard error, from fits with speeds near it."""
+    less, here, more = (one.cost for one in near)
+    # the cost is minus twice the log-likelihood
+    curvature = (less - 2 * here + more) / _CHANGE**2
+    error = math.sqrt(2 / curvature) if curvature > 0 else math.inf
+    speed = math.exp(logarithm)
+    errors = {
+        one.name: abs(near[2][one.name].value - near[0][one.name].value)
+        / (2 * _CHANGE)
+        * error
+        for one in term.strengths()
+    }
+    unit = term.written("[q]/s")
+    return FittedSpeed(term.name, Value(speed, error * speed, unit), errors)
