@@ -40,7 +40,12 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
             both = np.array(local)
             picks = [sensors[name].observe for name in direct]
             system = _still(model, part)
-            state = state_at(system, picks, clock, both[..., 0], both[..., 1], size)
+            known = both[..., 0], both[..., 1]
+            state = np.array(state_at(system, picks, clock, *known, size))
+            for place, pick in enumerate(picks):
+                if isinstance(pick, int):
+                    # a measured component is known better than from noisy slopes
+                    state[:, pick] = both[:, place, 0]
             found[row, : len(side), :size] = state
             if found is states:
                 for place, name in enumerate(lags):
