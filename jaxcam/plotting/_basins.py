@@ -25,8 +25,8 @@ _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
 # minimum number of cells of a picture along its shorter side
 _FINE = 500
-# number of cells along the shorter side from which boundaries are smoothed; in a coarser
-# grid, cells left as they are next to smoothed ones would look like features
+# number of cells along the shorter side from which boundaries are smoothed; in a
+# coarser grid, cells left as they are next to smoothed ones would look like features
 _COARSE = 64
 # size of the neighbourhood of a small cell, in units of the computed cells
 _BLUR = 1.2
