@@ -204,6 +204,7 @@ def test_the_ranking_separates_better_and_worse_explanations():
 
 def test_an_addition_that_fits_better_states_why_it_is_not_named():
     assert "required), but the term is doubtful" in _not_added(50.0, 10.0, True, True)
+    assert "but the bootstrap tests only" in _not_added(50.0, 10.0, True, False)
     assert "but this is a prediction" in _not_added(50.0, 10.0, False, False)
     assert _not_added(3.0, 10.0, True, False).endswith("where 10 is required")
 

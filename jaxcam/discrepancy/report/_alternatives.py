@@ -131,7 +131,7 @@ def _not_added(gain: float, asked: float, fitted: bool, dropped: bool) -> str:
     if dropped:
         cause = "the term is doubtful (see the caveat)"
     elif fitted:
-        cause = "not all of its terms are certain"
+        cause = "the bootstrap tests only the subset that the search chose"
     else:
         cause = "this is a prediction: the subset was not fitted"
     return (
