@@ -5,11 +5,14 @@ import dataclasses
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from jaxcam.cli import write_report
-from jaxcam.cli._diagnosis_figures import _broken, _shapes, draw, unit_along
+from jaxcam.cli._diagnosis_figures import _maps, _unseen, draw
 from jaxcam.cli._diagnosis_page import diagnosis_page
 from jaxcam.cli._output import to_text
+from jaxcam.cli._ranking_figure import ranking, two_lines
+from jaxcam.cli._shapes_figure import caption, shapes as draw_shapes, unit_along
 from jaxcam.discrepancy import Diagnosis, Verdict
 from jaxcam.discrepancy.evidence import Structure
 from jaxcam.discrepancy.report import (
@@ -20,6 +23,7 @@ from jaxcam.discrepancy.report import (
     Reason,
     spelled,
 )
+from jaxcam.discrepancy.report._alternatives import _not_added
 from jaxcam.discrepancy.terms import shapes, Value, Variable
 from jaxcam.fitting import Residuals
 
@@ -143,11 +147,66 @@ def test_functions_without_a_name_are_drawn_and_written(tmp_path):
 
 @pytest.mark.usefixtures("unchecked_types")
 def test_shapes_are_drawn_with_units_on_both_axes():
-    figure = _shapes(plt, _diagnosis("none", ()))
+    figure = draw_shapes(plt, _diagnosis("none", ()))
     axes = figure.axes[0]
     assert axes.get_xlabel() == "position (rad)"
     assert axes.get_ylabel() == "force (rad/s²)"
     plt.close(figure)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_a_model_that_is_not_changed_has_no_panel_with_effects():
+    """One panel of residuals per kind, and no label that names missing effects."""
+    for effects, panels in (((), 1), ((EFFECT,), 2)):
+        found = _diagnosis("effect" if effects else "none", effects)
+        figures = [_unseen(plt, found), _maps(plt, found), draw_shapes(plt, found)]
+        words = [text.get_text() for one in figures for text in one.findobj(Text)]
+        assert any("missing effects" in word for word in words) == bool(effects)
+        assert len(figures[0].axes) == panels
+        assert ("missing effects" in diagnosis_page(found, (), ())) == bool(effects)
+        plt.close("all")
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_only_significant_shapes_are_drawn():
+    """At most four, or the largest one and the statement that it is not significant."""
+    found = _diagnosis("effect", (EFFECT,))
+    (small,) = found.left_after
+    assert "not significant" in caption(found)
+    gains = (70.0, 50.0, 80.0, 90.0, 65.0, 100.0)
+    many = tuple(dataclasses.replace(small, gain=gain) for gain in gains)
+    for left, drawn in ((many, 4), (many[:3], 2), ((small, many[1]), 1)):
+        one = dataclasses.replace(found, left_after=left)
+        figure = draw_shapes(plt, one)
+        titles = [axis.get_title() for axis in figure.axes if axis.axison]
+        assert len(titles) == drawn
+        assert all(title.startswith("significant") for title in titles) == (drawn > 1)
+        plt.close(figure)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_the_ranking_separates_better_and_worse_explanations():
+    """Bars on both sides of zero; a better one states why it was not named."""
+    better = Alternative("sensor_lag", -2.8e5, ("sensor_lag",), "gains, but doubtful")
+    found = _diagnosis("effect", (EFFECT,))
+    found = dataclasses.replace(found, alternatives=(better, *found.alternatives))
+    figure = ranking(plt, found)
+    (axis,) = figure.axes
+    (bars,) = zip(*axis.containers, strict=True)
+    assert [bar.get_width() for bar in bars] == [-2.8e5, 55.0, 2000.0]
+    low, high = axis.get_xlim()
+    assert low < -2.8e5 and 2000.0 < high
+    assert bars[0].get_facecolor() != bars[1].get_facecolor()
+    notes = [one.get_text() for one in axis.texts if "not named" in one.get_text()]
+    assert notes == ["not named: doubtful"]
+    plt.close(figure)
+
+
+def test_an_addition_that_fits_better_states_why_it_is_not_named():
+    assert "required), but the term is doubtful" in _not_added(50.0, 10.0, True, True)
+    assert "but the bootstrap tests only" in _not_added(50.0, 10.0, True, False)
+    assert "but this is a prediction" in _not_added(50.0, 10.0, False, False)
+    assert _not_added(3.0, 10.0, True, False).endswith("where 10 is required")
 
 
 def test_every_shape_has_a_quantity_whose_unit_is_known():
@@ -186,6 +245,6 @@ def test_names_with_formulas_are_spelled_as_they_are():
 def test_a_long_label_has_two_lines():
     waves = [f"0.{k}*cos({k}*phase - 0.5)" for k in range(1, 5)]
     words = f"force {' + '.join(waves)}"
-    first, second = _broken(words).splitlines()
+    first, second = two_lines(words).splitlines()
     assert words.startswith(first) and second.endswith(" …")
-    assert _broken("sensor lag") == "sensor lag"
+    assert two_lines("sensor lag") == "sensor lag"

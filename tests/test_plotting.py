@@ -7,13 +7,15 @@ import pytest
 
 matplotlib.use("Agg")
 
+import equinox as eqx
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 from matplotlib.colors import to_rgba
 
 from jaxcam import plotting, simulate
+from jaxcam.cli._trajectory import summary
 from jaxcam.hybrid import HybridSystem, Settings, Trajectory
-from jaxcam.hybrid.record import Contacts, Impacts, Steps
+from jaxcam.hybrid.record import Contacts, Impacts, Steps, Switches
 from jaxcam.models import BouncingBall
 from jaxcam.plotting.curves import trajectory_curve
 from jaxcam.recordings import Recording
@@ -193,6 +195,27 @@ def test_a_curve_ends_in_the_state_before_an_impact(ball):
     assert len(ends) == 30 + 1 + 1
     assert np.nanmin(drawn.gap) >= -1e-12
     assert drawn.contact[-1] and not drawn.contact[first]
+
+
+def test_a_curve_is_dense_between_switches(ball):
+    """At least 40 points between two events, and the switches themselves, even if the
+    number of samples is small; the sentence of `jaxcam simulate` counts the switches.
+    """
+    time, none = np.array([0.05, 0.15]), np.zeros(2)
+    states = np.zeros((2, 2))
+    kind = surface = none.astype(int)
+    switches = Switches(time, states, states, surface, none, np.asarray(2), kind)
+    switched = eqx.tree_at(
+        lambda one: one.switches, ball, switches, is_leaf=lambda one: one is None
+    )
+    drawn = trajectory_curve(switched, (0.0, 0.2), 10)
+    assert set(time) <= set(drawn.time)
+    bounds = [0.0, *time, 0.2]
+    for low, high in zip(bounds, bounds[1:]):
+        assert np.sum((low <= drawn.time) & (drawn.time <= high)) >= 40
+    # a switch does not break the line
+    assert np.sum(np.isnan(drawn.time)) == 1
+    assert "30 impacts, 1 contact, 2 switching events" in summary("ball", switched)
 
 
 def test_phase_portrait_has_jumps_and_stroboscopic_points(ball):

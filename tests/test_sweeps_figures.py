@@ -12,6 +12,7 @@ from matplotlib.colors import to_rgba
 from sweep_maps import LOGISTIC, SQUARE_ROOT, SQUARED
 
 from jaxcam import plotting
+from jaxcam.plotting._basins import _finer
 from jaxcam.plotting._diagram import COLOURS
 from jaxcam.sweeps import basins, Chart, chart, diagram, Grid, Map
 
@@ -64,6 +65,16 @@ def test_a_picture_has_the_colours_of_its_legend(tmp_path):
     words = [text.get_text() for text in ax.get_legend().get_texts()]
     assert words == ["period 1 a  50.0%", "period 1 b  50.0%"]
     assert plotting.save_figure(figure, tmp_path / "a.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(("cells", "smoothed"), [(24, False), (63, False), (64, True)])
+def test_a_coarse_grid_is_drawn_as_it_is(cells, smoothed):
+    """The picture has one pixel per cell, equal to the computed number, up to 63."""
+    row, column = np.indices((cells, cells))
+    index = 1 + (row + 2 * column > cells).astype(int)
+    drawn = _finer(index, 3)
+    assert (drawn.shape != index.shape) == smoothed
+    assert smoothed or np.array_equal(drawn, index)
 
 
 def test_states_that_escape_are_white_and_named():

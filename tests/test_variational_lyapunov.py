@@ -17,7 +17,8 @@ from jaxcam.models import (
     ImpactOscillator,
     ReliefValve,
 )
-from variational._lyapunov import _in_turn, LyapunovSpectrum
+from variational._lyapunov import _in_turn
+from variational._spectrum import LyapunovSpectrum, standard_error
 
 
 # omega, wall: one impact a turn, and chaos
@@ -64,6 +65,45 @@ def test_exponents_of_a_periodic_orbit_are_those_of_its_multipliers():
     # turns
     np.testing.assert_allclose(settled.exponents, exact, atol=3 / 400)
     np.testing.assert_allclose(settled.exponents.sum(), exact.sum(), atol=1e-10)
+    assert np.all(np.abs(settled.exponents - exact) < 3 * settled.stderr)
+    words = str(settled)
+    assert f"{float(settled.exponents[0]):.6g}" in words and "f64" not in words
+    assert len(words.splitlines()) == 4 and "<table" in settled._repr_html_()
+
+
+def _growth(matrix, turns):
+    """Logarithms of the growth of a frame over each period of a linear map."""
+    frame, logs = np.eye(2), []
+    for _ in range(turns):
+        frame, upper = np.linalg.qr(matrix @ frame)
+        logs.append(np.log(np.abs(np.diag(upper))))
+    return np.array(logs)[None]
+
+
+def test_the_standard_error_contains_the_rotation_of_a_complex_pair():
+    """The exponents of 0.55 S R(angle) / S are log(0.55) twice. Blocks of a whole
+    number of rotations agree with each other, but not with the truth; the standard
+    error still covers the actual error within a factor of 3, and is not 5 times the
+    largest error of runs of about this length.
+    """
+    turn, stretch = 0.2553, np.diag([4.0, 1.0])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    local = _growth(0.55 * stretch @ rotation @ np.linalg.inv(stretch), 624)
+    worst = 0.0
+    for turns in range(590, 624):
+        part = local[:, :turns]
+        away = np.abs(part.mean(axis=1) - np.log(0.55))[0, 0]
+        error = standard_error(part, 16)[0, 0]
+        assert away < 3 * error
+        worst = max(worst, away)
+    assert standard_error(local[:, :592], 16)[0, 0] < 5 * worst
+
+
+def test_the_standard_error_of_independent_growth_is_that_of_a_mean():
+    """Within 20 % for 400 motions of 480 periods: sigma / sqrt(periods)."""
+    local = np.random.default_rng(3).normal(0.3, 2.0, size=(400, 480, 1))
+    error = np.mean(standard_error(local, 16))
+    assert error == pytest.approx(2 / np.sqrt(480), rel=0.2)
 
 
 def test_sticking_makes_minus_infinity():

@@ -11,7 +11,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.backend import Lacking, say_lacking
@@ -22,40 +21,9 @@ from jaxcam.hybrid.surface import check_restitution, restitutions
 from jaxcam.parameters import as_arrays, pick, real_array, Where
 
 from ._seen import Seen
+from ._spectrum import LyapunovSpectrum, standard_error
 from ._tangent_loop import frames_of_periods
 from ._turn_frames import first_turn, next_turns
-
-
-class LyapunovSpectrum(eqx.Module):
-    """Lyapunov exponents (1/s), with one set per motion if there are several."""
-
-    exponents: Float[Array, "*lanes n"]
-    """Exponents, largest first, shape `(n,)` or `(motions, n)`."""
-    stderr: Float[Array, "*lanes n"]
-    """Standard error of each exponent, from the scatter of blocks of consecutive
-    periods.
-    """
-    impact_rate: Float[Array, "*lanes"]
-    """Mean number of impacts per second."""
-    local: Float[Array, "*lanes turns n"]
-    """Finite-time exponents over each period, shape `(turns, n)`."""
-    state: Float[Array, "*lanes n"]
-    """Final state, from which the computation can be continued, shape `(n,)`."""
-    turn: Float[Array, "*lanes"] | Float[Array, "1"]
-    """Length of a period (s); shape `(1,)` if it is the same for all motions."""
-    code: Array
-    """0 if every period was completed; otherwise an index into `RESULTS`, and the
-    exponents are NaN.
-    """
-
-    @property
-    def running(self) -> Float[Array, "*lanes turns n"]:
-        """The exponents over the first 1, 2, ... periods, to check convergence."""
-        number = self.local.shape[-2]
-        count = jnp.arange(1.0, number + 1)[:, None]
-        return jnp.cumsum(self.local, axis=-2) / jnp.broadcast_to(
-            count, self.local.shape
-        )
 
 
 def lyapunov_spectrum(
@@ -90,7 +58,7 @@ def lyapunov_spectrum(
         where: Selects the parameter that differs between motions.
         values: Value of that parameter in each motion, shape `(motions,)`.
         settings: Accuracy of the simulation; the default tolerance is 1e-12.
-        blocks: Number of blocks for the standard error.
+        blocks: Number of blocks for the standard error (see `stderr` of the result).
         max_steps: Maximum number of attempted steps per motion, or per period with XLA.
         progress: Called with the fraction of periods completed.
 
@@ -258,12 +226,8 @@ def _summary(seen: Seen, status, length, transient, blocks):
         local = np.diff(seen.logs[:, transient:], axis=1) / length[:, None, None]
     stuck = np.isneginf(seen.logs[:, transient + 1 :])
     local = np.where(stuck & np.isnan(local), -np.inf, local)
-    lanes, turns, n = local.shape
-    size = turns // blocks
-    means = local[:, : size * blocks].reshape(lanes, blocks, size, n).mean(axis=2)
-    with np.errstate(invalid="ignore"):
-        error = means.std(axis=1, ddof=1) / np.sqrt(blocks)
-    error = np.where(np.isneginf(local).any(axis=1), 0.0, error)
+    turns = local.shape[1]
+    error = standard_error(local, blocks)
     # if some vectors vanish, their order need not be that of their growth
     mean = local.mean(axis=1)
     order = np.argsort(-np.nan_to_num(mean, nan=-np.inf), axis=1, kind="stable")

@@ -178,15 +178,18 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
 
 
 def _print(output, found, notes, outlook) -> None:
+    from ._changed import changed
     from ._outlook import terminal_table
 
     caveats = (caveat.sentence for caveat in found.caveats)
     for sentence in (*notes, found.summary, *caveats):
         output.print(sentence)
+    after = ""
+    if changed(found):
+        after = f", {found.heldout_after:.3e} with the missing effects"
     output.print(
         f"Error on held-out flights: {found.heldout_before:.3e} {found.unit} with the "
-        f"textbook model, {found.heldout_after:.3e} with the missing effects; noise: "
-        f"{found.noise_floor:.3e}."
+        f"textbook model{after}; noise: {found.noise_floor:.3e}."
     )
     for table in outlook.tables():
         output.print(terminal_table(table))

@@ -1,6 +1,5 @@
 """The figures of a report of `jaxcam diagnose`."""
 
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,41 +7,31 @@ import matplotlib
 import numpy as np
 
 from ..discrepancy import Diagnosis
-from ..discrepancy.evidence import Structure
-from ..discrepancy.report import MissingFunction, spelled
-from ..discrepancy.terms import Relaxation, Variable
+from ..discrepancy.report import MissingFunction
+from ..discrepancy.terms import Relaxation
 from ..fitting import Residuals
+from ._changed import changed
+from ._ranking_figure import RANKING, ranking
 from ._residual_axes import Along, residual_label, shown_in, title_of
+from ._shapes_figure import caption, shapes, unit_along
 
 
 matplotlib.use("Agg")
 
 from ..plotting import save_figure, style
-from ..plotting.colours import CONTACT, FLIGHT, IMPACT, RECORDED
+from ..plotting.colours import CONTACT, FLIGHT, IMPACT
 from ..plotting.labels import labelled
 
 
 _BINS = 36
-# maximum length of a line of a label (characters)
-_LABEL = 42
-
-
-def unit_along(variable: str, motion: str) -> str:
-    """Return the unit of the argument of a shape, given the unit of the motion."""
-    of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
-    if variable in of_drive:
-        return of_drive[Variable(variable)]
-    if motion in ("", "-"):
-        return "-" if variable == Variable.POSITION else "1/s"
-    return motion if variable == Variable.POSITION else f"{motion}/s"
 
 
 def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
     """Write all figures, and return each with its caption."""
     import matplotlib.pyplot as plt
 
-    maps = _MAPS.format(Along(found.unseen[0]).word)
-    shapes = _SHAPES if found.left_after else _SHAPES_BEFORE
+    unseen, maps = (_UNSEEN, _MAPS) if changed(found) else (_UNSEEN_ALONE, _MAPS_ALONE)
+    maps = maps.format(Along(found.unseen[0]).word)
     with style():
         missing = folder / "missing.png"
         nameless = []
@@ -50,10 +39,10 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
             nameless = [(save_figure(_missing(plt, found), missing), _MISSING)]
         return [
             *nameless,
-            (save_figure(_unseen(plt, found), folder / "unseen.png"), _UNSEEN),
+            (save_figure(_unseen(plt, found), folder / "unseen.png"), unseen),
             (save_figure(_maps(plt, found), folder / "maps.png"), maps),
-            (save_figure(_shapes(plt, found), folder / "shapes.png"), shapes),
-            (save_figure(_ranking(plt, found), folder / "ranking.png"), _RANKING),
+            (save_figure(shapes(plt, found), folder / "shapes.png"), caption(found)),
+            (save_figure(ranking(plt, found), folder / "ranking.png"), RANKING),
         ]
 
 
@@ -68,35 +57,41 @@ _UNSEEN = (
     "model refitted to the other recordings (top), and the model with the missing "
     "effects (bottom). The band is +-2 standard deviations of the noise."
 )
+_UNSEEN_ALONE = (
+    "Residuals of a held-out recording, predicted one flight ahead by the textbook "
+    "model refitted to the other recordings. The band is +-2 standard deviations of "
+    "the noise."
+)
 _MAPS = (
     "Mean residual of each recording against {}, in standard errors, before (left) "
     "and after (right) the missing effects are added: flights at the top, contacts (if "
     "any) at the bottom. For pure noise, one such map in a hundred would exceed the "
     "colour range."
 )
-_SHAPES = (
-    "Estimated corrections of the textbook model (grey) and of the model with the "
-    "missing effects (colour), as free functions with bands of twice the standard "
-    "error. A correction whose band contains zero is not needed."
+_MAPS_ALONE = (
+    "Mean residual of each recording against {}, in standard errors: flights at the "
+    "top, contacts (if any) at the bottom. For pure noise, one such map in a hundred "
+    "would exceed the colour range."
 )
-_SHAPES_BEFORE = (
-    "Corrections of the textbook model, each estimated alone as a free function, with "
-    "bands of twice the standard error. One missing effect shows in several of them; "
-    "the verdict contains what explains the data best."
-)
-_RANKING = "BIC of other explanations minus that of the verdict (logarithmic scale)."
 
 
 def _unseen(plt, found: Diagnosis):
     before, after = found.unseen
+    labels = ("textbook model, refitted", "with the missing effects")
+    rows = 2 if changed(found) else 1
     figure, axes = plt.subplots(
-        2, 1, figsize=(8.5, 4.6), sharex=True, sharey=True, layout="constrained"
+        rows,
+        1,
+        figsize=(8.5, 0.6 + 2.0 * rows),
+        sharex=True,
+        sharey=True,
+        layout="constrained",
+        squeeze=False,
     )
+    axes = axes[:, 0]
     both = max(zip(before, after), key=_improvement)
     factor, _ = shown_in(both[0])
-    for axis, part, label in zip(
-        axes, both, ("textbook model, refitted", "with the missing effects")
-    ):
+    for axis, part, label in zip(axes, both, labels):
         for resting in _sides(both):
             keep = part.resting == resting
             axis.plot(
@@ -129,9 +124,10 @@ def _maps(plt, found: Diagnosis):
 
     every = found.unseen[0]
     along, sides = Along(every), _sides(every)
+    sets = (", before", ", after") if changed(found) else ("",)
     figure, axes = plt.subplots(
         len(sides),
-        2,
+        len(sets),
         figsize=(8.5, 0.6 + 2.2 * len(sides)),
         sharex=True,
         sharey=True,
@@ -141,7 +137,7 @@ def _maps(plt, found: Diagnosis):
     names = list(dict.fromkeys(title_of(part, every) for part in every))
     end = float(norm.isf(0.005 / (_BINS * len(names) * len(sides))))
     image = None
-    for column, parts, which in zip(axes.T, found.unseen, ("before", "after")):
+    for column, parts, which in zip(axes.T, found.unseen, sets):
         for axis, resting in zip(column, sides):
             rows = [
                 _binned(
@@ -159,7 +155,7 @@ def _maps(plt, found: Diagnosis):
                 interpolation="nearest",
             )
             axis.set_yticks(range(len(rows)), names)
-            axis.set_title(f"{'contact' if resting else 'flight'}, {which}")
+            axis.set_title(f"{'contact' if resting else 'flight'}{which}")
             axis.grid(False)
     for axis in axes[-1]:
         axis.set_xlabel(along.label)
@@ -228,69 +224,3 @@ def _unit_of(one: MissingFunction, argument: str, motion: str) -> str:
     if argument == "memory":
         return "s" if isinstance(one.element, Relaxation) else motion
     return unit_along(argument, motion)
-
-
-def _shapes(plt, found: Diagnosis):
-    before = {one.name: one for one in found.left_before if len(one.grid)}
-    after = {one.name: one for one in found.left_after if len(one.grid)}
-    rows = -(-len(before) // 3)
-    figure, axes = plt.subplots(rows, 3, figsize=(9, 2.3 * rows), layout="constrained")
-    for axis in axes.flat[len(before) :]:
-        axis.axis("off")
-    for axis, name in zip(axes.flat, before):
-        _band(axis, before[name], RECORDED, "textbook model")
-        if name in after:
-            _band(axis, after[name], IMPACT, "with the missing effects")
-        axis.axhline(0.0, color="k", lw=0.6)
-        one = before[name]
-        axis.set_xlabel(labelled(one.variable, unit_along(one.variable, found.unit)))
-        axis.set_ylabel(labelled(one.quantity, one.unit.replace("^2", "²")))
-        axis.xaxis.label.set_size(10)
-        axis.yaxis.label.set_size(10)
-        axis.tick_params(labelsize=10)
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, ncols=2, loc="outside upper right")
-    return figure
-
-
-def _band(axis, one: Structure, color, label) -> None:
-    axis.fill_between(
-        one.grid,
-        one.value - 2 * one.stderr,
-        one.value + 2 * one.stderr,
-        color=color,
-        alpha=0.3,
-        lw=0,
-    )
-    axis.plot(one.grid, one.value, color=color, label=label)
-
-
-def _broken(name: str) -> str:
-    """Return a long name, such as a formula, in at most two lines."""
-    lines = textwrap.wrap(name, _LABEL, break_on_hyphens=False)
-    if len(lines) > 2:
-        lines = [lines[0], f"{lines[1]} …"]
-    return "\n".join(lines)
-
-
-def _ranking(plt, found: Diagnosis):
-    ranked = found.alternatives[: found.policy.alternatives]
-    pairs = [(one.name, one.delta_bic) for one in ranked] or [("none", 0.0)]
-    names = [_broken(spelled(name)) for name, _ in pairs]
-    rows = len(pairs) + sum(name.count("\n") for name in names) / 2
-    figure, axis = plt.subplots(figsize=(8, 0.35 * rows + 1.0), layout="constrained")
-    # dots, not bars: a logarithmic axis has no zero for bars to start from
-    for row, (_, delta) in enumerate(pairs):
-        axis.plot(max(delta, 0.1), row, "o", color=FLIGHT)
-        axis.annotate(
-            f"{delta:.3g}", (max(delta, 0.1), row), (7, 0), va="center",
-            textcoords="offset points", fontsize="small",
-        )  # fmt: skip
-    axis.set_yticks(range(len(names)), names)
-    axis.set_ylim(-0.6, len(names) - 0.4)
-    axis.set_xscale("log")
-    # the axis starts at the same value in every report, so that reports can be compared
-    axis.set_xlim(0.05, max(1e2, 4 * max(delta for _, delta in pairs)))
-    axis.invert_yaxis()
-    axis.set_xlabel("BIC minus that of the verdict (–)")
-    return figure

@@ -7,6 +7,7 @@ from pathlib import Path
 from ..discrepancy import Diagnosis, Verdict
 from ..discrepancy.report import listed, number, spelled
 from ..tables import scaled
+from ._changed import changed
 from ._outlook import Outlook
 from ._page import figure_html, sentences, STYLE, table_html
 from ._residual_axes import REACH
@@ -93,11 +94,13 @@ def _effects(found: Diagnosis) -> list[str]:
 def _before_and_after(found: Diagnosis) -> list[str]:
     # choose the same unit as in the figures
     factor, unit = scaled(found.unit, REACH * found.noise_floor)
+    after = ""
+    if changed(found):
+        after = f" and {factor * found.heldout_after:.3g} with the missing effects"
     parts = [
         "<h2>Error on held-out flights</h2>",
         f"<p>The error is {factor * found.heldout_before:.3g} {unit} with the "
-        f"textbook model and {factor * found.heldout_after:.3g} with the missing "
-        "effects; the noise and rounding of the sensor amount to "
+        f"textbook model{after}; the noise and rounding of the sensor amount to "
         f"{factor * found.noise_floor:.3g}.</p>",
     ]
     if found.misfit:
@@ -157,14 +160,22 @@ def _left_over(found: Diagnosis) -> list[str]:
 
 
 def _parameters(found: Diagnosis) -> list[str]:
-    rows = [(name, f"{a:+.2f}", f"{b:+.2f}") for name, (a, b) in found.pulls.items()]
+    columns = 2 if changed(found) else 1
+    rows = [
+        (name, *(f"{one:+.2f}" for one in pulls[:columns]))
+        for name, pulls in found.pulls.items()
+    ]
     headings = ("parameter", "textbook model", "with the missing effects")
+    note = "Deviation from the rig file, in units of the tolerance stated there."
+    if changed(found):
+        note += (
+            " A parameter that deviates in the first column but not in the second "
+            "compensated for the missing physics."
+        )
     return [
         "<h2>Parameters of the rig</h2>",
-        table_html(headings, rows, text=(0,)),
-        '<p class="note">Deviation from the rig file, in units of the tolerance '
-        "stated there. A parameter that deviates in the first column but not in the "
-        "second compensated for the missing physics.</p>",
+        table_html(headings[: 1 + columns], rows, text=(0,)),
+        f'<p class="note">{note}</p>',
     ]
 
 

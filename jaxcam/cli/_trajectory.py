@@ -83,15 +83,19 @@ def summary(name: str, trajectory: Trajectory) -> str:
     if isinstance(getattr(system, "base", system), CamFollower):
         speed = system.speed  # pyright: ignore
         at = f" at {float(rad_s_to_rpm(speed)):.6g} rpm"
-    impacts = _counted(int(trajectory.impacts.count), "impact")
-    contacts = _counted(int(trajectory.contacts.count), "contact")
+    counts = [
+        _counted(int(trajectory.impacts.count), "impact"),
+        _counted(int(trajectory.contacts.count), "contact"),
+    ]
+    if trajectory.switches is not None:
+        counts.append(_counted(int(trajectory.switches.count), "switching event"))
     # a run from the release point begins there, slightly before t0
     began = float(trajectory.steps.time[0])
     span = f"from {began:.6g} to {reached:.6g}{unit and f' {unit}'}"
     kept = bool(np.any(trajectory.steps.contact[-1]))
     last = "in contact" if kept else "in flight"
     stopped = "" if bool(trajectory.successful) else "stopped early, "
-    return f"{name}{at}, {span}: {impacts}, {contacts}; {stopped}{last} at the end."
+    return f"{name}{at}, {span}: {', '.join(counts)}; {stopped}{last} at the end."
 
 
 def about(trajectory: Trajectory) -> dict[str, Any]:

@@ -25,6 +25,9 @@ _SHOWN = len(COLOURS) - 1
 _OTHERS = "#D9D9D9"
 # minimum number of cells of a picture along its shorter side
 _FINE = 500
+# number of cells along the shorter side from which boundaries are smoothed; in a
+# coarser grid, cells left as they are next to smoothed ones would look like features
+_COARSE = 64
 # size of the neighbourhood of a small cell, in units of the computed cells
 _BLUR = 1.2
 _MARKS = "osD^vP*X"
@@ -109,14 +112,15 @@ def basin_picture(
 
 
 def _finer(index, count: int) -> np.ndarray:
-    """Refine the regions into smaller cells, to smooth slanting boundaries.
+    """Refine the regions into smaller cells, to smooth slanting boundaries; a coarse
+    grid is not refined.
 
     A small cell is assigned to the region that covers most of its neighbourhood. If
     that would change the computed result at the centre of a cell, the cell is not
     refined, so thin and fractal regions are not smoothed away.
     """
     factor = -(-_FINE // min(index.shape))
-    if factor == 1:
+    if factor == 1 or min(index.shape) < _COARSE:
         return index
     # odd, so that one of the small cells is at the centre of a cell
     factor += 1 - factor % 2

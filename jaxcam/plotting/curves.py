@@ -8,8 +8,9 @@ from jaxtyping import Bool, Float, Int
 from ..hybrid import Trajectory
 
 
-# number of points in a flight that is shorter than the sampling interval
-_SHORT_FLIGHT = 8
+# minimum number of points between two events, and number if that is shorter than the
+# sampling interval
+_BETWEEN_EVENTS, _SHORT_FLIGHT = 40, 8
 _POINTS_IN_STEP = 4
 
 
@@ -120,8 +121,9 @@ def trajectory_curve(
     found = hits(trajectory, start, stop)
     spans = contact_spans(trajectory, start, stop)
     knots = np.unique(np.concatenate([[start, stop], found.time, spans.ravel()]))
-    numbers = _points(trajectory, knots, samples)
-    pieces = [np.linspace(a, b, n) for a, b, n in zip(knots, knots[1:], numbers)]
+    times = _times(trajectory, knots, samples)
+    inner = np.searchsorted(times, knots)
+    pieces = [times[i : j + 1] for i, j in zip(inner, inner[1:])]
     ends = np.cumsum([len(piece) for piece in pieces])
     time = np.concatenate(pieces)
     padded = _padded(time)
@@ -151,16 +153,36 @@ def trajectory_curve(
     )
 
 
-def _points(trajectory: Trajectory, knots, samples: int) -> list[int]:
-    """Return the number of points between each two consecutive knots, which are impacts
-    and ends of contacts.
+def _times(trajectory: Trajectory, knots, samples: int) -> np.ndarray:
+    """Return the times of the points, with each knot (impact or end of a contact) once.
+
+    The vector field changes at a switch, so the points are distributed between
+    switches as between knots.
     """
-    even = np.ceil(samples * np.diff(knots) / (knots[-1] - knots[0])) + 1
+    events = knots
+    if trajectory.switches is not None:
+        found = trajectory.switches
+        switches = np.asarray(found.time)[: int(found.count)]
+        inside = (switches > knots[0]) & (switches < knots[-1])
+        events = np.unique(np.concatenate([knots, switches[inside]]))
+    numbers = _points(trajectory, events, samples)
+    parts = [
+        np.linspace(a, b, n - 1, endpoint=False)
+        for a, b, n in zip(events, events[1:], numbers)
+    ]
+    return np.append(np.concatenate(parts), events[-1])
+
+
+def _points(trajectory: Trajectory, events, samples: int) -> list[int]:
+    """Return the number of points between each two consecutive events."""
+    every = (events[-1] - events[0]) / samples
+    even = np.ceil(np.diff(events) / every) + 1
+    least = np.where(np.diff(events) > every, _BETWEEN_EVENTS, _SHORT_FLIGHT)
     # a long run may oscillate between two evenly spaced points, but its integration
     # steps follow every oscillation
     steps = np.asarray(trajectory.steps.time)[: int(trajectory.steps.count)]
-    follows = _POINTS_IN_STEP * np.diff(np.searchsorted(steps, knots))
-    return np.maximum(np.maximum(even, follows), _SHORT_FLIGHT).astype(int).tolist()
+    follows = _POINTS_IN_STEP * np.diff(np.searchsorted(steps, events))
+    return np.maximum(np.maximum(even, follows), least).astype(int).tolist()
 
 
 def _padded(times):

@@ -113,15 +113,31 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
                 information, score, free, own, trials.policy.distinct_information
             )
         asked = trials.threshold(term.name)
-        reason = (
-            f"would increase twice the log-likelihood by {max(gain, 0.0):.3g}, where "
-            f"{asked:.3g} is required"
-        )
-        if term.name in dropped:
-            reason += "; the term is doubtful (see the caveat)"
+        reason = _not_added(gain, asked, known is not None, term.name in dropped)
         delta = trials.count([term.name]) * price - gain
         terms = tuple(sorted(names))
         yield Alternative("+".join(terms), delta, terms, reason)
+
+
+def _not_added(gain: float, asked: float, fitted: bool, dropped: bool) -> str:
+    """Return the reason why a term was not added, given its gain, the gain that is
+    required, and whether the term was fitted and then dropped.
+    """
+    if gain < asked:
+        return (
+            f"would increase twice the log-likelihood by {max(gain, 0.0):.3g}, where "
+            f"{asked:.3g} is required"
+        )
+    if dropped:
+        cause = "the term is doubtful (see the caveat)"
+    elif fitted:
+        cause = "the bootstrap tests only the subset that the search chose"
+    else:
+        cause = "this is a prediction: the subset was not fitted"
+    return (
+        f"would increase twice the log-likelihood by {gain:.3g} ({asked:.3g} "
+        f"required), but {cause}"
+    )
 
 
 def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
