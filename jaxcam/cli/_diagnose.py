@@ -78,7 +78,6 @@ def diagnose(
     from ._cache import keep_compiled_programs
     from ._case import notes_of, read
     from ._diagnose_files import write_diagnosis, write_verdict
-    from ._outlook import Outlook
     from ._output import Output
     from ._progress import progress
 
@@ -104,15 +103,13 @@ def diagnose(
             keep=keep,
             policy=_policy(minutes),
         )
-        figures, outlook, failure = [], Outlook(), None
+        figures = []
         if out is not None:
             report("drawing", None)
             figures = write_diagnosis(out, found, notes)
-        try:
-            outlook = _outlook(found, nominal, predict, propose, seed, report)
-        except ValueError as error:
-            # the verdict does not depend on predictions and recommendations
-            failure = error
+        outlook, failure = _outlook_or_error(
+            found, nominal, predict, propose, seed, report
+        )
         if out is not None:
             write_verdict(out, found, figures, notes, outlook)
     _print(output, found, notes, outlook)
@@ -146,6 +143,18 @@ def _kept_fits(out: Path | None, resume: bool) -> Path | None:
             "continue it, or give another folder with --out."
         )
     return keep
+
+
+def _outlook_or_error(*arguments):
+    """Return the outlook and no error, or an empty outlook and the reason why there is
+    none: the verdict does not depend on predictions and recommendations.
+    """
+    from ._outlook import Outlook
+
+    try:
+        return _outlook(*arguments), None
+    except ValueError as error:
+        return Outlook(), error
 
 
 def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
