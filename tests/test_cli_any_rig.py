@@ -209,6 +209,8 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ),
         ("fit case --rig cart.toml", "case: there is no such folder"),
         ("fit . --rig cart.toml", "there is no recording"),
+        ("fit runs --rig nosuch.toml", "nosuch.toml does not exist"),
+        ("fit runs", "runs contains no rig.toml; give the rig file with --rig"),
         (
             "fit . --system cart.py:Cart",
             "contains no rig.toml; give the rig file with --rig",
