@@ -275,6 +275,13 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
         ("-self.stiffness", "-self.stifness", "`vector_field` of Cart fails"),
         ("return state[0] - self.wall", "return state - 1.0", "the shape (2,), but"),
         ("return jnp.stack([state[0], -0.5 * state[1]])", "return -state[1]", "(2,)"),
+        (
+            "return state[0] - self.wall",
+            "return state[0] if state[1] > 0 else state[0] - self.wall",
+            "`gap` of Cart needs the values of time or state",
+        ),
+        ("state[0] - self.wall", "float(state[0])", "jnp.where instead of if"),
+        ("state[0] - self.wall", "(0.0, 1.0)[state[0].astype(int)]", "jax.numpy"),
         ("state[0] - self.wall", "1 / 0", "`gap` of Cart fails (ZeroDivision"),
         (
             "    def gap",
