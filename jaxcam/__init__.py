@@ -6,6 +6,11 @@ result. Importing this package turns on 64-bit floats in JAX.
 
 from importlib.metadata import version as _version
 
+from ._xla_log import silence_xla as _silence_xla
+
+
+_silence_xla()
+
 import jax as _jax
 
 

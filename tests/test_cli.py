@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 import shlex
 import subprocess
@@ -18,7 +19,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 import jaxcam as package
-from jaxcam import discrepancy
+from jaxcam import _xla_log, discrepancy
 from jaxcam.cli import app
 from jaxcam.cli._cache import keep_compiled_programs
 from jaxcam.cli._output import to_text
@@ -371,3 +372,27 @@ def test_a_verdict_is_kept_if_no_recording_can_be_recommended(tmp_path, monkeypa
     said = CliRunner().invoke(app, line)
     assert said.exit_code == 2 and "No flight occurs" in said.output
     assert json.loads(file.read_text()) == {"verdict": "none"}
+
+
+@pytest.mark.parametrize(
+    ("words", "interpreter", "level"),
+    [
+        (["/usr/bin/jaxcam", "fit"], ["python", "/usr/bin/jaxcam", "fit"], "3"),
+        (["jaxcam.exe"], ["jaxcam.exe"], "3"),
+        (["-m", "fit"], ["python", "-X", "dev", "-m", "jaxcam", "fit"], "3"),
+        (["-m"], ["python", "-m", "jaxcam.cli"], "3"),
+        (["-m"], ["python", "-m", "pytest"], None),
+        (["study.py"], ["python", "study.py"], None),
+    ],
+)
+def test_only_the_command_line_silences_the_compiler(
+    words, interpreter, level, monkeypatch
+):
+    monkeypatch.setattr(_xla_log.sys, "argv", words)
+    monkeypatch.setattr(_xla_log.sys, "orig_argv", interpreter)
+    monkeypatch.delenv("TF_CPP_MIN_LOG_LEVEL", raising=False)
+    _xla_log.silence_xla()
+    assert os.environ.get("TF_CPP_MIN_LOG_LEVEL") == level
+    monkeypatch.setenv("TF_CPP_MIN_LOG_LEVEL", "0")
+    _xla_log.silence_xla()
+    assert os.environ["TF_CPP_MIN_LOG_LEVEL"] == "0"

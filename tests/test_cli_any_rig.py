@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from jaxcam.cli import _fit_result, app
 from jaxcam.cli._output import Output
 from jaxcam.data import DEMO_RIG
+from jaxcam.fitting._fit_result import Estimate
 
 
 ROOT = Path(__file__).parents[1]
@@ -119,10 +120,41 @@ def test_the_reason_of_a_failed_fit_is_left_to_standard_error(
         seen=SimpleNamespace(sentences=lambda: []),
         laws={},
         remainder="Remainder.",
+        outside=[],
         sentence="Reason. Remainder.",
     )
     _fit_result.print_fit(Output(None, None), found, ())  # pyright: ignore
     assert capsys.readouterr().out.count("Reason.") == converged
+
+
+def _ended(gravity: float, ratio: float):
+    """A fit with one parameter (9.81 +- 0.02) and one channel."""
+    parameter = SimpleNamespace(tolerance=0.02, nominal=9.81)
+    problem = SimpleNamespace(
+        parameter=lambda name: parameter, samples=9, records=("a", "b")
+    )
+    estimate = Estimate("gravity", gravity, 0.001, "m/s^2")
+    after = SimpleNamespace(estimates=[estimate])
+    found = _fit_result.Result(problem, (), None, after, None, {}, None)  # pyright: ignore
+    return found, {"record": "a", "channel": "x", "rms": ratio, "ratio": ratio}
+
+
+@pytest.mark.parametrize(
+    ("gravity", "count"), [(9.973, 1), (9.647, 1), (9.8325, 0), (9.834, 1)]
+)
+def test_a_value_outside_its_tolerance_is_said(gravity, count):
+    """By more than 3 standard errors (of 0.001) beyond 9.79 or 9.83."""
+    sentences = _ended(gravity, 1.0)[0].outside
+    assert len(sentences) == count
+    for sentence in sentences:
+        assert "outside its tolerance (9.79 to 9.83 m/s^2)" in sentence
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(999.0, False), (1001.0, True)])
+def test_a_hopeless_fit_doubts_the_units(ratio, said, monkeypatch):
+    found, quality = _ended(9.81, ratio)
+    monkeypatch.setattr(_fit_result.Result, "quality", [quality])
+    assert ("deg or rad, ms or s" in found.remainder) == said
 
 
 def test_the_example_is_written_once(tmp_path, monkeypatch):
@@ -209,6 +241,8 @@ def test_a_driven_system_is_simulated_by_turns(rig):
         ),
         ("fit case --rig cart.toml", "case: there is no such folder"),
         ("fit . --rig cart.toml", "there is no recording"),
+        ("fit runs --rig nosuch.toml", "nosuch.toml does not exist"),
+        ("fit runs", "runs contains no rig.toml; give the rig file with --rig"),
         (
             "fit . --system cart.py:Cart",
             "contains no rig.toml; give the rig file with --rig",

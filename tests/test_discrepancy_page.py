@@ -237,6 +237,8 @@ def test_a_report_is_written_from_python(tmp_path, monkeypatch, unchecked_types)
 def test_names_with_formulas_are_spelled_as_they_are():
     """Terms are joined by a plus sign; those in formulas and numbers stay."""
     assert spelled("coulomb_friction+sensor_lag") == "Coulomb friction + sensor lag"
+    # of a system that has no cam, too
+    assert spelled("cam_profile_error") == "profile error"
     assert (
         spelled("force 1e+05*max(x - 2, 0) + 3*x") == "force 1e+05*max(x - 2, 0) + 3*x"
     )

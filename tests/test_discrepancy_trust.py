@@ -11,6 +11,7 @@ from swing_rig import PARAMETERS, Swing
 from jaxcam.discrepancy import diagnose, Policy, strength, Term, Verdict
 from jaxcam.discrepancy.evidence import shares, VisitedStates
 from jaxcam.discrepancy.report import Reason
+from jaxcam.discrepancy.report._units_in_doubt import units_in_doubt
 from jaxcam.discrepancy.search import system_question
 from jaxcam.fitting import Parameter, Sensor
 from jaxcam.recordings import Recording, segment
@@ -227,3 +228,24 @@ def test_a_search_whose_time_is_over_says_so():
     assert found.verdict is Verdict.UNKNOWN and found.names == ("unknown",)
     assert Reason.TIME in {caveat.reason for caveat in found.caveats}
     assert found.left_before
+
+
+@pytest.mark.parametrize(
+    ("after", "single", "said"),
+    [
+        (999.0, None, False),
+        (1001.0, None, True),
+        (2.0, 1001.0, True),
+        (1e6, 2.0, False),
+    ],
+)
+@pytest.mark.usefixtures("unchecked_types")
+def test_a_hopeless_model_doubts_the_units(after, single, said):
+    """Beyond 1000 times the noise, on held-out data or on single pieces."""
+    errors = [] if single is None else [SimpleNamespace(residual=single, stated=1.0)]
+    caveats = units_in_doubt(
+        SimpleNamespace(model_errors=errors),  # pyright: ignore
+        SimpleNamespace(held=SimpleNamespace(after=after)),  # pyright: ignore
+        Policy(),
+    )
+    assert [caveat.reason for caveat in caveats] == [Reason.UNITS] * said

@@ -11,7 +11,7 @@ from fitting_rigs import DraggedBall
 from numpy.testing import assert_allclose
 
 from jaxcam import fitting
-from jaxcam.fitting._ellipse import Ellipse
+from jaxcam.fitting._ellipse import Ellipse, most_correlated
 from jaxcam.recordings import record, segment
 
 
@@ -132,6 +132,14 @@ def test_the_worst_pair_is_said(found):
     worst = np.max(np.abs(np.tril(found.correlation, -1)))
     assert f"{worst:.4f}" in sentence
     assert sum(name in sentence for name in TRUTH) == 2
+
+
+def test_no_parameter_is_hard_to_distinguish_from_itself():
+    """Parameters without correlation, or with one that is not a number."""
+    for value in (0.0, math.nan):
+        correlation = np.where(np.eye(2) > 0, 1.0, value)
+        sentence = most_correlated(("gravity", "drag"), correlation)
+        assert sentence == "No two fitted parameters are correlated."
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from jaxcam.fitting import (
     Turning,
 )
 from jaxcam.recordings import Recording, RecordingError
+from jaxcam.recordings.cut import segment_gaps
 from jaxcam.recordings.cut._cut import _impact
 
 
@@ -180,3 +181,47 @@ def test_a_jump_that_leads_on_into_the_surface_is_more_than_one(separation, kind
         "separation": separation,
     }
     assert _impact(found).kind == kind
+
+
+def _bounces(top: float, time) -> np.ndarray:
+    """The gap (m) of a body that lands at 0.2 s and stays in contact until `top`."""
+    gap = np.where(time < 0.2, np.sin(12 * (0.2 - time)), 0.0)
+    gap = np.where(time > top, 8 * (time - top) ** 2, gap)
+    return gap + 1e-4 * np.random.default_rng(0).standard_normal(len(time))
+
+
+def test_two_bodies_may_be_in_contact_at_the_same_time():
+    """Their contacts, until 0.4 s and 0.5 s, count as one, which ends like the longer
+    of the two alone (to 5 ms), and begins at 0.2 s (to 1 ms).
+    """
+    time = 1e-3 * np.arange(800)
+
+    def contact(*tops):
+        gaps = np.stack([_bounces(top, time) for top in tops])
+        run = Recording("two", time, {"gap_m": gaps[0]})
+        (found,) = segment_gaps(run, "gap_m", gaps, [0.0] * len(tops)).contacts
+        return found
+
+    alone = contact(0.5).stop
+    for tops in ((0.4, 0.5), (0.5, 0.4), (0.5, 0.5)):
+        both = contact(*tops)
+        assert abs(both.start.time - 0.2) < 1e-3
+        assert both.stop.kind == alone.kind == "release"
+        assert abs(both.stop.time - alone.time) < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "scale"),
+    [(0.35, -0.42, 1.0), (-0.35, 0.42, 180 / np.pi)],
+    ids=["walls exchanged", "degrees called radians"],
+)
+def test_a_motion_inside_its_walls_is_refused(lower, upper, scale):
+    """More than half of the samples are inside, by more than a quarter of the range."""
+    time = 2e-3 * np.arange(500)
+    swing = (2 / np.pi) * np.arcsin(np.sin(9 * time))
+    angle = scale * (0.035 + 0.385 * swing)
+    angle = angle + 1e-4 * np.random.default_rng(0).standard_normal(len(time))
+    run = Recording("run1", time, {"angle_rad": angle})
+    gaps = np.stack([angle - lower, upper - angle])
+    with pytest.raises(RecordingError, match="run1: the motion is inside .*gap 1 and"):
+        segment_gaps(run, "angle_rad", gaps, [0.01, 0.01])

@@ -162,6 +162,9 @@ def test_names_of_the_file_become_channels(tmp_path):
     assert is_the_table(case[0])
     with pytest.raises(RecordingError, match="`angle_rad` is missing.*columns"):
         read_recordings(file, channels=["angle_rad"], columns={"t": "time_s"})
+    # the headings of the file, not the channels that they would become
+    with pytest.raises(RecordingError, match="file has `t`, `Angle of the arm`;"):
+        read_recordings(file, channels=["gyro_rad_s"], columns=names)
     with pytest.raises(RecordingError, match="no column `T`.*is `t` meant"):
         read_recordings(file, columns={"T": "time_s"})
     with pytest.raises(RecordingError, match="factor of `t` is 0"):

@@ -19,7 +19,7 @@ from jaxcam.fitting.own_systems import (
     system_source,
 )
 from jaxcam.models import BouncingBall
-from jaxcam.recordings import Recording, RigError, segment
+from jaxcam.recordings import Recording, RecordingError, RigError, segment
 
 
 ROOT = Path(__file__).parents[1]
@@ -275,6 +275,13 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
         ("-self.stiffness", "-self.stifness", "`vector_field` of Cart fails"),
         ("return state[0] - self.wall", "return state - 1.0", "the shape (2,), but"),
         ("return jnp.stack([state[0], -0.5 * state[1]])", "return -state[1]", "(2,)"),
+        (
+            "return state[0] - self.wall",
+            "return state[0] if state[1] > 0 else state[0] - self.wall",
+            "`gap` of Cart needs the values of time or state",
+        ),
+        ("state[0] - self.wall", "float(state[0])", "jnp.where instead of if"),
+        ("state[0] - self.wall", "(0.0, 1.0)[state[0].astype(int)]", "jax.numpy"),
         ("state[0] - self.wall", "1 / 0", "`gap` of Cart fails (ZeroDivision"),
         (
             "    def gap",
@@ -325,3 +332,15 @@ def test_a_problem_is_built_from_recordings_that_are_cut(tmp_path):
     problem = setup.problem(parts)
     assert isinstance(problem, Problem)
     assert problem.names == ("stiffness",)
+
+
+@pytest.mark.parametrize("steps", [0, 1])
+def test_a_sensor_that_shows_no_motion_is_refused(tmp_path, steps):
+    """Constant, or toggling between two codes 1e-5 m apart."""
+    rig = RIG.replace("noise = 1e-5", "noise = 1e-5\nresolution = 1e-5")
+    setup = read_setup(written(tmp_path, rig))
+    time = 1e-3 * np.arange(60)
+    still = 0.01 + 1e-5 * steps * (np.arange(60) % 2)
+    run = Recording("still", time, {"position_m": still})
+    with pytest.raises(RecordingError, match="still: the channel `position_m` is 0.01"):
+        setup.segments([run])

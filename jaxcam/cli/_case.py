@@ -21,6 +21,10 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
     from ..recordings.files import CAM_FOLLOWER, read_layout, read_tables
 
     folder = case.parent if case.is_file() else case
+    if case.exists():
+        # without its rig file, a recording of any rig would seem to be one of a
+        # cam-follower that lacks channels
+        _rig_file(folder, rig)
     usual = folder / "rig.toml" if rig is None else rig
     if system is not None or (usual.is_file() and is_setup(usual)):
         setup = read_setup(_rig_file(folder, rig), system)
@@ -56,11 +60,18 @@ def notes_of(runs) -> tuple[str, ...]:
 
 
 def _rig_file(folder: Path, rig: Path | None) -> Path:
+    """Return the rig file.
+
+    **Raises:** `ValueError` if it does not exist.
+    """
     if rig is not None:
+        if not rig.is_file():
+            raise ValueError(f"{rig} does not exist; give the path of a rig file.")
         return rig
     file = folder / "rig.toml"
     if not file.is_file():
         raise ValueError(
-            f"{folder} contains no rig.toml; give the rig file with --rig."
+            f"{folder} contains no rig.toml; give the rig file with --rig "
+            "(`jaxcam new-rig` writes an example)."
         )
     return file

@@ -22,6 +22,11 @@ _OPTIONS = (
     ("state=None needs", "a start at the release point needs"),
     ("pass the state to start from", "give the state to start from with --state"),
     ("pass the states to start from", "give a state to start from, as in --state 0,0"),
+    (
+        "pass Stroboscopic(system, period=...) with a period in seconds",
+        "give the class a `period` property, or use jaxcam.sweeps.Stroboscopic(system, "
+        "period=...) in Python",
+    ),
     ('engine="diffeqsolve"', "--engine diffeqsolve"),
     ("pass one (diffrax.Dopri8(), diffrax.Tsit5())", "choose --solver dopri8"),
     ('gaps="split"', "--gaps split"),

@@ -24,7 +24,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
         table.add_column(heading, justify="right", no_wrap=True)
     for k, one in enumerate(found.estimates):
         parameter = problem.parameter(one.name)
-        nominal = float(problem.start.values[0, problem.names.index(one.name)])
+        nominal = nominal_value(problem, one.name)
         cells = [
             f"{nominal:.4g}",
             f"{parameter.tolerance:.2g}",
@@ -36,6 +36,14 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
         label = ", ".join(part for part in (one.unit, one.record) if part)
         table.add_row(f"{one.name} ({label})" if label else one.name, *cells)
     return table
+
+
+def nominal_value(problem: Problem, name: str) -> float:
+    """Return the nominal value of a parameter."""
+    stated = problem.parameter(name).nominal
+    if stated is not None:
+        return stated
+    return float(problem.start.values[0, problem.names.index(name)])
 
 
 def correlation_table(found: Fit) -> Table:

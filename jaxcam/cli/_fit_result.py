@@ -1,6 +1,7 @@
 """Compute the result of `jaxcam fit`, and print and save it."""
 
 import dataclasses
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -9,10 +10,16 @@ import equinox as eqx
 from .. import fitting
 from ..discrepancy import Policy
 from ..recordings import Recording, Rig, segment_case, Segments
-from ._fit_report import correlation_table, parameter_table
+from ._fit_report import correlation_table, nominal_value, parameter_table
 from ._impact_laws import impact_laws
 from ._output import Output
 from ._saved_system import as_saved
+
+
+# Standard errors by which a value must exceed its tolerance
+_SURE = 3.0
+# Ratio of rms residual to noise above which the columns may have other units
+_HOPELESS = 1000.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +65,31 @@ class Result:
                 " The model is incomplete, or the noise is larger than stated; "
                 "`jaxcam diagnose` with the same files seeks what is missing."
             )
+        if ratio > _HOPELESS:
+            sentence += (
+                " Check the units, the signs and the order of the columns first (deg "
+                "or rad, ms or s, mm or m)."
+            )
         return sentence
+
+    @property
+    def outside(self) -> list[str]:
+        """Return a sentence for each value that is certainly outside its tolerance."""
+        problem, found = self.problem, []
+        for one in self.after.estimates:
+            tolerance = problem.parameter(one.name).tolerance
+            middle = nominal_value(problem, one.name)
+            excess = abs(one.value - middle) - tolerance
+            if not math.isfinite(one.stderr) or not excess > _SURE * one.stderr:
+                continue
+            unit = f" {one.unit}" if one.unit not in ("", "-") else ""
+            found.append(
+                f"The fitted {one.label} is {one.value:.4g} +- {one.stderr:.1g}{unit}, "
+                f"outside its tolerance ({middle - tolerance:.4g} to "
+                f"{middle + tolerance:.4g}{unit}): correct the rig file if this value "
+                "is possible, or look for an effect that acts like it."
+            )
+        return found
 
     def to_json(self, about: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fitted system with its errors, for use with `--system` in other
@@ -71,6 +102,7 @@ class Result:
             "notes": about["notes"],
             "identifiability": self.seen.sentences(),
             "most_correlated": self.after.most_correlated(),
+            "outside_tolerance": self.outside,
             "residuals": self.quality,
             "restitution": {name: law.sentence() for name, law in self.laws.items()},
             "figures": about["figures"],
@@ -156,6 +188,8 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
     output.print(parameter_table(found.problem, found.after, found.again))
     output.print(correlation_table(found.after))
     output.print(found.after.most_correlated())
+    for sentence in found.outside:
+        output.print(sentence)
     for name, law in found.laws.items():
         where = name.rpartition(", ")[0]
         sentence = law.sentence()

@@ -30,3 +30,8 @@ class Setting(NamedTuple):
     value: Any
     group: Group
     says: str
+
+
+def has_several(value: object) -> bool:
+    """Return whether a setting has several values."""
+    return isinstance(value, tuple)

@@ -8,11 +8,10 @@ error rate per term and the detection limit are derived from the data and the se
 import dataclasses
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from scipy.stats import norm
 
-from ._settings import bounds, decides, Group as Group, Setting, shows
+from ._settings import bounds, decides, Group as Group, has_several, Setting, shows
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -297,6 +296,10 @@ class Policy:
     decoy: float = shows(
         0.5, "fraction of a function's gain that its decoy may reach without a caveat"
     )
+    units_doubted: float = shows(
+        1000.0,
+        "rms residual, in units of the noise, above which a caveat doubts the units",
+    )
     moved_errors: float = shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
@@ -326,7 +329,7 @@ class Policy:
                 )
         for setting in self.settings():
             least = -1 if setting.name in ("functions", "elements") else 0
-            low = min(setting.value) if _several(setting.value) else setting.value
+            low = min(setting.value) if has_several(setting.value) else setting.value
             if not low > least or not math.isfinite(low):
                 raise ValueError(
                     f"Policy: `{setting.name}` is {setting.value!r}; give positive "
@@ -353,7 +356,3 @@ class Policy:
             about = field.metadata
             value = getattr(self, field.name)
             yield Setting(field.name, value, about["group"], about["says"])
-
-
-def _several(value: Any) -> bool:
-    return isinstance(value, tuple)

@@ -109,7 +109,10 @@ def most_correlated(labels: Sequence[str], correlation) -> str:
     if len(labels) < 2:
         return "Fewer than two parameters were fitted, so none are correlated."
     size = np.abs(np.where(np.isfinite(correlation), correlation, 0.0))
-    i, k = divmod(int(np.argmax(np.tril(size, -1))), len(labels))
+    size = np.tril(size, -1)
+    if not np.any(size):
+        return "No two fitted parameters are correlated."
+    i, k = divmod(int(np.argmax(size)), len(labels))
     value = float(np.clip(correlation[i, k], -1.0, 1.0))
     kept = max(1 - value**2, np.finfo(float).eps) ** 0.5
     together = "in opposite directions" if value < 0 else "together"

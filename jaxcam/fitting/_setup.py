@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from ..recordings import read_case, Recording, RecordingError, Segments
 from ..recordings.files import Case, FileLayout
 from ._segment_by_model import segment_by_model
@@ -115,8 +117,8 @@ class Setup:
         `progress` is called with the completed fraction of the recordings to segment.
 
         Raises:
-            RecordingError: A channel is missing, or a gap is not measured by any
-                channel.
+            RecordingError: A channel is missing, the motion in a channel is constant,
+                or a gap is not measured by any channel.
         """
         runs = tuple(
             dataclasses.replace(run, recording=self._with_known(run.recording))
@@ -127,6 +129,8 @@ class Setup:
         uncut = [run for run in runs if isinstance(run, Recording)]
         if not uncut:
             return tuple(run for run in runs if isinstance(run, Segments))
+        for run in uncut:
+            self._refuse_still(run)
         cut = iter(
             segment_by_model(
                 self.model,
@@ -137,6 +141,17 @@ class Setup:
             )
         )
         return tuple(run if isinstance(run, Segments) else next(cut) for run in runs)
+
+    def _refuse_still(self, run: Recording) -> None:
+        """Raise `RecordingError` for a sensor of the motion that shows no motion."""
+        for name, sensor in self.model.sensors.items():
+            samples = run[name]
+            # the resolution is a decimal fraction, which samples do not reach exactly
+            if np.ptp(samples) <= 1.001 * sensor.resolution:
+                raise RecordingError(
+                    f"{run.name}: the channel `{name}` is {samples[0]:g} throughout; "
+                    "check that its sensor is connected, or remove this recording."
+                )
 
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
         """Return the fitting problem of recordings, segmented or not.

@@ -4,7 +4,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.errors import ConcretizationTypeError, TracerArrayConversionError
+from jax.errors import (
+    ConcretizationTypeError,
+    TracerArrayConversionError,
+    TracerIntegerConversionError,
+)
 
 from ._identity import digest_of, structure_of
 from ._prepared import prepared
@@ -15,6 +19,30 @@ from .backend import Rowwise
 from .loop import starts_behind
 from .programs import is_traced
 from .surface import check_restitution, restitutions
+
+
+NEEDS_VALUES = (
+    ConcretizationTypeError,
+    TracerArrayConversionError,
+    TracerIntegerConversionError,
+)
+"""Errors raised by a function that JAX cannot trace."""
+
+
+def needs_values(name: str) -> str:
+    """Return the sentence about a function that raises one of `NEEDS_VALUES`.
+
+    Args:
+        name: Name of the function, as the sentence begins.
+
+    Returns:
+        The sentence, without a full stop.
+    """
+    return (
+        f"{name} needs the values of time or state, which are not known during "
+        "compilation; write it with jax.numpy (jnp.cos, not np.cos or math.cos), and "
+        "use jnp.where instead of if"
+    )
 
 
 def refuse_tracers(name: str, instead: str, *arguments) -> None:
@@ -74,9 +102,12 @@ def check_gaps(system: HybridSystem, settings: Settings, t0, state) -> None:
     if not np.all(np.isfinite(values)):
         raise ValueError("the gap is not finite at t0; check the state and parameters")
     if behind:
+        # only such systems have a release point
+        released = system.period is not None and (len(state), np.size(values)) == (2, 1)
+        hint = ", or pass state=None to start at the release point" if released else ""
         raise ValueError(
             f"gap is negative ({np.min(values):.1e}) at t0; start with every gap at "
-            "zero or above, or pass state=None to start at the release point"
+            f"zero or above{hint}"
         )
 
 
@@ -202,12 +233,8 @@ def _shape(system, name, *arguments):
     """Return the shape and type of the result of a method of the system."""
     try:
         made = jax.eval_shape(getattr(system, name), *arguments)
-    except (ConcretizationTypeError, TracerArrayConversionError) as error:
-        raise ValueError(
-            f"{name} needs the values of time or state, which are not "
-            "known during compilation; write it with jax.numpy (jnp.cos, not np.cos "
-            "or math.cos), and use jnp.where instead of if"
-        ) from error
+    except NEEDS_VALUES as error:
+        raise ValueError(needs_values(name)) from error
     if not isinstance(made, jax.ShapeDtypeStruct):
         raise ValueError(
             f"{name} returns a {type(made).__name__}; return one array, "

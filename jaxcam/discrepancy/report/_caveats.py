@@ -28,6 +28,7 @@ class Reason(enum.StrEnum):
     BEYOND_TOLERANCE = "beyond tolerance"
     NOISIER = "noisier than stated"
     MODEL_ERROR = "errors of the model"
+    UNITS = "units in doubt"
     TIME = "time is over"
     SET_ASIDE = "record set aside"
 

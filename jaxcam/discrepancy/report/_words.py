@@ -1,20 +1,6 @@
 """Format numbers for the sentences of a verdict."""
 
-import re
-
-
-_PROPER = ("coulomb", "stribeck")
-
-
-def spelled(name: str) -> str:
-    """Return the name of one or several terms as words, with capitals in the names of
-    people.
-    """
-    # only between words: formulas and numbers in a name also contain plus signs
-    words = re.sub(r"(?<=[a-z])\+(?=[a-z])", " + ", str(name)).replace("_", " ")
-    for one in _PROPER:
-        words = words.replace(one, one.capitalize())
-    return words
+from ..terms import spelled as spelled
 
 
 def listed(names) -> str:

@@ -49,6 +49,7 @@ from ._effects import (
 )
 from ._missing import missing_functions, named_function
 from ._summary import summary_of, summary_of_functions
+from ._units_in_doubt import units_in_doubt
 
 
 def diagnosis_of(
@@ -208,6 +209,7 @@ def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[C
         found = choice.rejected.functions
         parts = [named_function(found.fit, part) for part in found.functions]
         yield not_predictive(choice.rejected, " and a ".join(parts))
+    yield from units_in_doubt(question, choice, trials.policy)
     yield from out_of_time(trials)
 
 

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from ...fitting import Problem
 from ...fitting.engine import Point, separated
 from ..policy import Policy
-from ..terms import Family, own_faults, Term, Where
+from ..terms import Family, own_faults, spelled, Term, Where
 from ._clock import Clock
 from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
@@ -165,7 +165,7 @@ class FreeSearch:
         On single pieces of flight, a smooth function may score better than the right
         one.
         """
-        self.progress(f"fitting {lead.label} instead", None)
+        self.progress(f"fitting {spelled(lead.label)} instead", None)
         return self._with(self.problem, bare, lead)
 
     def lacks_element(self, found: Missing | None) -> bool:
@@ -219,7 +219,7 @@ class FreeSearch:
             for lead in leads:
                 if self._done(best, lead, leads[0]) or self.clock.over:
                     break
-                said = lead.label.replace("_", " ")
+                said = spelled(lead.label)
                 self.progress(f"fitting {said}", None)
                 trial = self._with(problem, found, lead)
                 if trial is not None and apart and leads is self.first:
@@ -322,7 +322,7 @@ class FreeSearch:
             rival = self.left_out.replacement(found, out, most)
             if rival is None:
                 continue
-            self.progress(f"fitting {rival.replace('_', ' ')}", None)
+            self.progress(f"fitting {spelled(rival)}", None)
             names = rest.names | {rival}
             problems = (self.apart, self.problem)
             for problem in problems[1:] if self.roughly else problems:

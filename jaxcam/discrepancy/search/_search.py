@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..terms import spelled
 from ._blocks import values_of
 from ._gains import added_gain, gain
 from ._trials import Trial, Trials
@@ -34,7 +35,7 @@ class Search:
             for k, names in enumerate(order):
                 if self.trials.clock.over:
                     break
-                said = " and ".join(sorted(names)).replace("_", " ")
+                said = " and ".join(spelled(name) for name in sorted(names))
                 self.trials.progress(f"fitting {said}", k / len(order))
                 start = promised[names][1]
                 if self._settles(start, self.trials.attempt(names, start)):

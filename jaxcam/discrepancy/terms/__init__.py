@@ -49,6 +49,7 @@ from ._sensed import (
     watched as watched,
 )
 from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
+from ._spelled import spelled as spelled
 from ._switched_base import (
     SwitchedWithHidden as SwitchedWithHidden,
     SwitchedWithTerms as SwitchedWithTerms,

@@ -124,7 +124,7 @@ class CamProfileError(Term):
     """A cam that is out of round by `run cos(2 phi + lead)`; phi is the drive angle."""
 
     name: ClassVar[str] = "cam_profile_error"
-    sentence: ClassVar[str] = "an error of the cam profile, twice per revolution"
+    sentence: ClassVar[str] = "an error of the profile, twice per period of the drive"
     where: ClassVar[str] = Where.CONTACT
     region: ClassVar[str] = "at impacts and in contact, as a function of drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
@@ -144,7 +144,7 @@ class ExternalVibration(Term):
 
     name: ClassVar[str] = "external_vibration"
     sentence: ClassVar[str] = "an external vibration at its own frequency"
-    region: ClassVar[str] = "in flight, periodic in time but not with the cam"
+    region: ClassVar[str] = "in flight, periodic in time"
     source: ClassVar[str] = "Den Hartog, Mechanical Vibrations, 1956, section 2.9"
     ext_sin: float = strength("[q]/s^2", 0.1)
     ext_cos: float = strength("[q]/s^2", 0.1)

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from ...hybrid import HybridSystem
+from ...hybrid.checks import NEEDS_VALUES, needs_values
 from ...parameters import as_arrays, parameter_names
 from ...recordings import RigError
 from ...recordings.files import printable
@@ -141,6 +142,9 @@ def _refuse_broken(file: Path, system: HybridSystem) -> None:
         at = jnp.zeros(()), jnp.zeros(count)
         try:
             found[function] = jax.eval_shape(getattr(system, function), *at).shape
+        except NEEDS_VALUES as error:
+            said = needs_values(f"`{function}` of {name}")
+            raise RigError(f"{file}: {said}.") from error
         except Exception as error:
             raise RigError(
                 f"{file}: `{function}` of {name} fails ({fault(error)}); correct it."

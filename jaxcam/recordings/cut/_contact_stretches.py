@@ -5,6 +5,7 @@ boundary: a contact stays within four times the noise for 5 ms; a flight rises a
 times the noise.
 """
 
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -68,6 +69,32 @@ def overlap(one: Span, other: Span) -> bool:
     """Return whether two stretches overlap or are closer than the shortest flight."""
     margin = SHORTEST_FLIGHT
     return one[0] - margin < other[1] and other[0] < one[1] + margin
+
+
+def merged(
+    resting: Mapping[Span, int], doubtful: Mapping[Span, int]
+) -> tuple[dict[Span, tuple[int, int]], dict[Span, tuple[int, int]]]:
+    """Return the contacts and doubtful contacts, with those merged that overlap or
+    touch; each has the indices of the surfaces on which it begins and ends.
+
+    Several bodies can be in contact at the same time, each with its own surface. There
+    is no flight between such contacts, so they count as one; it is doubtful only if
+    all of them are.
+    """
+    found: list[tuple[Span, tuple[int, int], bool]] = []
+    every = [(span, (k, k), False) for span, k in resting.items()]
+    every += [(span, (k, k), True) for span, k in doubtful.items()]
+    for span, ends, unsure in sorted(every):
+        if found and span[0] <= found[-1][0][1]:
+            before, (start, stop), other = found.pop()
+            ends = start, ends[1] if span[1] > before[1] else stop
+            span = before[0], max(before[1], span[1])
+            unsure = unsure and other
+        found.append((span, ends, unsure))
+    return (
+        {span: ends for span, ends, unsure in found if not unsure},
+        {span: ends for span, ends, unsure in found if unsure},
+    )
 
 
 def _grazes(motion: Motion, first: int, last: int) -> bool:

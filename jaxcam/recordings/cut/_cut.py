@@ -9,6 +9,7 @@ from ._contact_stretches import (
     contact_stretches,
     HIGH,
     LOW,
+    merged,
     overlap,
     SHORTEST_CONTACT,
     SIGNIFICANT,
@@ -73,19 +74,20 @@ def cut(
         for place in wrong:
             del marks[place]
 
-    side = {place: k for span, k in {**resting, **doubtful}.items() for place in span}
+    ends = {**resting, **doubtful}.items()
+    side = {place: k for span, pair in ends for place, k in zip(span, pair)}
     side |= marks
     boundaries: dict[int, Boundary] = {}
     for place, found in crossed.items():
         boundaries[place] = _impact(found)
     for first, last in stretches:
-        here = sides[side[first]]
         if first in before:
+            here = sides[side[first]]
             fit = here.fit(before[first], first, at_end=True)
             boundaries[first] = _landing(here, first, fit)
         if last in after:
             end = after[last]
-            release = _release(here, first, last, end)
+            release = _release(sides[side[last]], first, last, end)
             latest = float(motion.time[(last + end) // 2])
             if any(a < last < b for a, b in doubted):
                 boundaries[last] = _still_near(float(motion.time[last]), latest)
@@ -119,8 +121,8 @@ def cut(
 
 
 def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
-    """Return contacts, doubtful contacts and impacts, each with the index of its
-    side.
+    """Return contacts and doubtful contacts with the sides at their ends, and impacts
+    with their side.
     """
     # gaps may have different units, so they are compared in units of their noise
     nearest = np.argmin(np.stack([side.gap / side.noise for side in sides]), axis=0)
@@ -146,7 +148,7 @@ def _places(sides: Sequence[Motion], doubted: Sequence[Span]):
         and not any(overlap(pair, other) for other in resting)
     }
     kept = away(sides[0], list(marks), sorted([*resting, *doubtful]))
-    return resting, doubtful, {mark: marks[mark] for mark in kept}
+    return *merged(resting, doubtful), {mark: marks[mark] for mark in kept}
 
 
 def _reach(side: Motion) -> float:

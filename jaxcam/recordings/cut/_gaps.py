@@ -8,6 +8,7 @@ from jaxtyping import Float
 from .._drive import Drive
 from .._recording import Recording
 from ._cut import cut
+from ._inside import refuse_inside
 from ._motion import Motion
 from ._placed import placed
 from ._polynomial import measured_noise
@@ -42,6 +43,8 @@ def segment_gaps(
 
     **Returns:** the segments; `impacts.side` is the index of the gap that closed, and
     `impacts.before` and `impacts.after` are its rates of change.
+
+    **Raises:** `RecordingError` if a gap is far below zero most of the time.
     """
     none = np.zeros(len(recording))
     sides = []
@@ -49,6 +52,7 @@ def segment_gaps(
         noise = measured_noise(gap)
         side = Motion(recording.time, gap, none, none, noise, recording.interval)
         sides.append(placed(side, tolerance) if tolerance > 0 else side)
+    refuse_inside(recording.name, sides, tolerances)
     flights, contacts, impacts = cut(sides, restitution, doubted)
     return Segments(
         recording,

@@ -70,7 +70,7 @@ def read_columns(
         numbers = source.numbers(name, missing=columns is not None)
         found[renamed] = numbers * (factor * unit)
     found = _timed(source, found, rate)
-    require(file, found, (*needed, *([split] if split else [])))
+    _require(source, found, (*needed, *([split] if split else [])))
     return _without_missing(source, found)
 
 
@@ -97,14 +97,14 @@ def _opened(
     return _source(file, _in_order(file, columns)), {}
 
 
-def require(file: Path, found: Mapping[str, object], needed: Sequence[str]) -> None:
-    """Raise `RecordingError` for a missing channel."""
+def _require(source: Source, found: Mapping[str, object], needed: Sequence[str]):
+    """Raise `RecordingError` for a missing channel, with the headings of the file."""
     missing = [name for name in needed if name not in found]
     if missing:
         raise RecordingError(
-            f"{file}: the column `{missing[0]}` is missing; the file has "
-            f"{listed(found)}; assign it with --columns or in [columns] of the rig "
-            f"file (columns=... in Python)."
+            f"{source.file}: the column `{missing[0]}` is missing; the file has "
+            f"{listed(source.columns)}; assign it with --columns or in [columns] of "
+            f"the rig file (columns=... in Python)."
         )
 
 
