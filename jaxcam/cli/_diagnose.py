@@ -74,7 +74,6 @@ def diagnose(
     files.check()
 
     from .. import discrepancy
-    from ..fitting import Setup
     from ._cache import keep_compiled_programs
     from ._case import notes_of, read
     from ._diagnose_files import write_diagnosis, write_verdict
@@ -83,12 +82,8 @@ def diagnose(
 
     keep_compiled_programs()
     runs, nominal = read(case, rig, files, system)
-    if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
-        raise ValueError(
-            "--next recommends a drive speed, but this rig has no rotating drive; "
-            "leave --next out, and pass simulated recordings to "
-            "jaxcam.discrepancy.compare_experiments."
-        )
+    if propose:
+        _refuse_without_drive(nominal)
     output = Output(json_file, out)
     keep = _kept_fits(out, resume)
     notes = notes_of(runs)
@@ -116,6 +111,18 @@ def diagnose(
     output.write_json({**found.to_json(), **outlook.data()})
     if failure is not None:
         raise failure
+
+
+def _refuse_without_drive(nominal) -> None:
+    """Raise `ValueError` if the rig has no rotating drive, whose speed is proposed."""
+    from ..fitting import Setup
+
+    if isinstance(nominal, Setup) and nominal.drive_channel is None:
+        raise ValueError(
+            "--next recommends a drive speed, but this rig has no rotating drive; "
+            "leave --next out, and pass simulated recordings to "
+            "jaxcam.discrepancy.compare_experiments."
+        )
 
 
 def _policy(minutes: float | None):
