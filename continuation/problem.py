@@ -291,6 +291,13 @@ class AbstractProblem(eqx.Module):
         del points
         return None
 
+    def touching(self, context: Any, at: Any, reach: float) -> Any:
+        """Return the [`continuation.Touch`][] within `reach` ahead of a solution, or
+        None.
+        """
+        del context, at, reach
+        return None
+
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":
         """Return the same problem with its internal references updated at this point.
 
