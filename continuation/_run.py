@@ -185,7 +185,8 @@ class Run:
                 # special points just before a grazing would be missed
                 step /= 2
                 continue
-            if short and (leaps or (attempted.at is None and failures >= _HALVINGS)):
+            last = step / 2 < shortest
+            if short and (leaps or (attempted.at is None and (failures or last))):
                 over = self._touch(current, step)
                 if over is not None:
                     return over
@@ -196,7 +197,7 @@ class Run:
                 names = sign_changes(self.context, current, following)
                 passed = located_between(self.context, current, following, names)
                 doubt = self._doubt(current, passed)
-                if doubt and step / 2 >= shortest:
+                if doubt and not last:
                     # the step may have led to another branch
                     step /= 2
                     continue
@@ -210,7 +211,6 @@ class Run:
                         return back
                     return following, attempted.bound
             # a sharp bend is no sign of an end, and a failed long step need not be one
-            last = step / 2 < shortest
             failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
                 over = self._end_ahead(current, step)

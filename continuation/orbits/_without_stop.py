@@ -117,7 +117,7 @@ def _equations(problem, leaf: int, window: Window, row):
     times = start + shares * (end - start)
     number = gaps(system, start, x).shape[0]
     lifts = jnp.where(jnp.arange(number) == which, window.lift, 0.0)
-    away = jnp.array([0.0, 1.0, 1.0, 0.0])[:, None] * lifts
+    away = jnp.outer(jnp.array([0.0, 1.0, 1.0, 0.0]), lifts)
     strikes = jnp.array([False, True, False, False]) & window.strikes
 
     def piece(x, part):
