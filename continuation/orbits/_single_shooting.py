@@ -48,9 +48,10 @@ class SingleShooting(AbstractProblem):
     or `"change of events"`. If the sequence changes twice in one step, the second
     change may be missed.
 
-    Where an impact grazes, the Jacobian is unbounded on one side; follow orbits of
-    systems without switching surfaces with [`continuation.ImpactingOrbits`][], which
-    locates grazing orbits exactly.
+    Where an impact grazes, the Jacobian is unbounded on one side. In a system with
+    switching surfaces, the grazing is therefore located with equations that are smooth
+    there, and the branch continues with one impact more or fewer. Follow orbits of
+    systems without switching surfaces with [`continuation.ImpactingOrbits`][].
 
     Examples:
         >>> import continuation
