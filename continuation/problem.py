@@ -45,8 +45,8 @@ class AbstractProblem(eqx.Module):
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,
-    `signature`, `with_signature`, `padded`, `accumulation`, `touching`. They may compile
-    their own programs.
+    `signature`, `with_signature`, `padded`, `accumulation`, `touching`. They may
+    compile their own programs.
 
     **Order of calls** for a step from point a to point b: first the corrector, then
     `derivatives` and `seen` at b in the same program. If a monitor with `ends` has

@@ -113,11 +113,8 @@ def _windows(problem, leaf: int, z) -> list[tuple[Window, float]]:
     for m, share, strikes in found:
         apart = np.abs(np.concatenate([[0.0, 1.0], hits]) - share)
         half = min(widest, float(np.min(apart[apart > 0])) / 2)
-        window = Window(
-            *(np.asarray(v) for v in (m, share - half, share + half, sizes[m])),
-            np.asarray(strikes),
-        )
-        windows.append((window, share))
+        values = (m, share - half, share + half, sizes[m], strikes)
+        windows.append((Window(*map(np.asarray, values)), share))
     return windows
 
 
