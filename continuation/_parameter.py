@@ -38,6 +38,17 @@ def as_arguments(parameters: PyTree, *leaves: int) -> PyTree:
     return jax.tree.unflatten(structure, flat)
 
 
+def as_jax(parameters: PyTree) -> PyTree:
+    """Return the parameters with NumPy arrays, such as one varied by a branch, as JAX
+    arrays.
+    """
+
+    def converted(leaf):
+        return jnp.asarray(leaf) if isinstance(leaf, np.ndarray) else leaf
+
+    return jax.tree.map(converted, parameters)
+
+
 def leaf_of(parameters: PyTree, index: int):
     """Return the leaf with this index."""
     return jax.tree.leaves(parameters)[index]

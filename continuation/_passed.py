@@ -7,7 +7,8 @@ import numpy as np
 from ._context import Context
 from ._point import with_field, with_parameter
 from ._program import evaluate
-from ._solution import Solution
+from ._solution import Solution, solution_after
+from ._step import StepAttempt
 from .special import (
     BRANCH_POINT,
     locate,
@@ -27,6 +28,8 @@ class Special(NamedTuple):
     criticality: str
 
 
+SHORT = 1e-2
+"""Longest step around a corner or past a grazing, relative to the initial step."""
 # distance from a special point at which the branch on either side of it is examined,
 # relative to the length of the step
 _BESIDE = 1e-3
@@ -67,14 +70,30 @@ def corners(current: Solution, following: Solution) -> list[str]:
     ]
 
 
+def around_corner(
+    context: Context, current: Solution, attempted: StepAttempt, step: float
+) -> StepAttempt:
+    """Accept a step that turns abruptly if it is short and passes a corner."""
+    short = SHORT * context.settings.step
+    if attempted.solution is None or step > short:
+        return attempted
+    following = solution_after(current, context.leaf, attempted.solution, short)
+    if not corners(current, following):
+        return attempted
+    return StepAttempt(attempted.solution, attempted.bound, short)
+
+
 def located_between(
     context: Context, current: Solution, following: Solution, names: list[str]
 ) -> list[tuple[str, Located]]:
     """Return the zeros of these test functions, in the order in which they are passed.
 
     A common zero of two functions counts once, unless a monitor ends the branch there.
+    If a change at a corner could not be located, other functions may have changed sign
+    only because they jump there; those without a zero are omitted.
     """
     monitors = current.problem.monitors()
+    turns = corners(current, following)
     found: list[tuple[float, str, Located]] = []
     for name in names:
         values = (current.tests[name], following.tests[name])
@@ -91,6 +110,9 @@ def located_between(
         ]
         if same and (name not in monitors or not monitors[name].ends):
             continue
+        if not located.converged and (name in turns or name not in monitors):
+            if any(n in turns and not other.converged for _, n, other in found):
+                continue
         along = float(way @ (current.at.tangent / current.at.scale))
         found.append((along, name, located))
     found.sort(key=lambda item: item[0])
@@ -111,10 +133,10 @@ def special_here(
         at = with_field(at, "tangent", chord / np.linalg.norm(chord / at.scale))
     monitors, kind = problem.monitors(), name
     if name in monitors:
-        sides = [
-            _unknowns(problem, context, located.z + share * chord)
-            for share in (-_BESIDE, _BESIDE)
-        ]
+        ends = [located.z + share * chord for share in (-_BESIDE, _BESIDE)]
+        if not located.converged:
+            ends = [current.at.z, current.at.z + chord]
+        sides = [_unknowns(problem, context, z) for z in ends]
         found = problem.kind_of_zero(name, *sides)
         if found is None:
             return None

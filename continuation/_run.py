@@ -1,6 +1,6 @@
 """Follow a branch step by step."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,13 @@ from ._closed import closed, Past
 from ._context import Context
 from ._joins import JOINS, joins
 from ._parameter import as_arguments, leaf_of
-from ._passed import corners, located_between, sign_changes, special_here
+from ._passed import (
+    around_corner,
+    located_between,
+    SHORT,
+    sign_changes,
+    special_here,
+)
 from ._point import Point, set_parameters, with_field, with_parameter
 from ._program import evaluate
 from ._solution import (
@@ -21,14 +27,13 @@ from ._solution import (
     solution_at,
     stations,
 )
-from ._step import attempt_step, StepAttempt
-from .problem import AbstractProblem, Start
+from ._step import attempt_step
+from ._touch import hits_differ, touched
+from .problem import AbstractProblem
 from .special import ahead, Located
 from .step_control import Refusal
 
 
-# longest step around a corner of the branch, relative to the initial step
-_CORNER = 1e-2
 # number of failed steps from one point before an end of the branch is sought just ahead
 _HALVINGS = 2
 
@@ -129,11 +134,9 @@ class Run:
     def points(self, current: Solution) -> Iterator[Point]:
         """Yield the pending points, and then the points after `current`."""
         yield from self._flush()
-        low, high = self.context.bounds
+        (low, high), p = self.context.bounds, current.at.z[-1]
         outwards = current.at.tangent[-1]
-        if (current.at.z[-1] <= low and outwards < 0) or (
-            current.at.z[-1] >= high and outwards > 0
-        ):
+        if (p <= low and outwards < 0) or (p >= high and outwards > 0):
             yield self._end(current, f"the branch starts at a bound of {self.name}")
             return
         count = self.label
@@ -173,8 +176,20 @@ class Run:
                 step,
                 self.name,
             )
-            attempted = self._around_corner(current, attempted, step)
+            attempted = around_corner(self.context, current, attempted, step)
             refusal = attempted.refusal
+            shortest = self.context.settings.min_step
+            short = step <= max(SHORT * self.context.settings.step, 2 * shortest)
+            leaps = hits_differ(current, attempted)
+            if leaps and not short:
+                # special points just before a grazing would be missed
+                step /= 2
+                continue
+            last = step / 2 < shortest
+            if short and (leaps or (attempted.at is None and (failures or last))):
+                over = self._touch(current, step)
+                if over is not None:
+                    return over
             if attempted.at is not None:
                 following = solution_after(
                     current, self.context.leaf, attempted.at, attempted.following
@@ -182,7 +197,7 @@ class Run:
                 names = sign_changes(self.context, current, following)
                 passed = located_between(self.context, current, following, names)
                 doubt = self._doubt(current, passed)
-                if doubt and step / 2 >= self.context.settings.min_step:
+                if doubt and not last:
                     # the step may have led to another branch
                     step /= 2
                     continue
@@ -196,7 +211,6 @@ class Run:
                         return back
                     return following, attempted.bound
             # a sharp bend is no sign of an end, and a failed long step need not be one
-            last = step / 2 < self.context.settings.min_step
             failures += attempted.refusal is not Refusal.TURNED
             if failures > _HALVINGS or last:
                 over = self._end_ahead(current, step)
@@ -205,20 +219,6 @@ class Run:
             if last:
                 return None, (f"the step was halved down to {step:.1e}, but {refusal}")
             step /= 2
-
-    def _around_corner(
-        self, current: Solution, attempted: StepAttempt, step: float
-    ) -> StepAttempt:
-        """Accept a step that turns abruptly if it is short and passes a corner."""
-        usual = self.context.settings.step
-        if attempted.solution is None or step > _CORNER * usual:
-            return attempted
-        following = solution_after(
-            current, self.context.leaf, attempted.solution, _CORNER * usual
-        )
-        if not corners(current, following):
-            return attempted
-        return StepAttempt(attempted.solution, attempted.bound, _CORNER * usual)
 
     def _with_fresh_references(self, current: Solution) -> Solution:
         problem = current.problem
@@ -296,23 +296,34 @@ class Run:
                 return self._transition(current, *found)
         return None
 
-    def _transition(self, current: Solution, point: Point, stood: Solution):
+    def _touch(self, current: Solution, step: float):
+        """Pass a grazing near a short step; None if there is none."""
+        found = touched(self.context, current, step)
+        if found is None:
+            return None
+        touch, stood = found
+        point = self._point(stood, "grazing", touch.reason)
+        self.pending.append(point)
+        if touch.start.tangent is None:
+            return None, "grazing ends the branch; no orbit was found beyond it"
+        return self._transition(current, point, stood, touch.start)
+
+    def _transition(self, current, point: Point, stood: Solution, beyond=None):
         """Return the first solution beyond a point, or None and why the run ends."""
         self.changes.append(point)
         towards = current.at.tangent[-1]
         self.direction = 1 if towards >= 0 else -1
         reason = f"{point.kind} ends the branch"
-        starts: tuple[Callable[[], Start | None], ...] = (
-            lambda: current.problem.accumulation(self.changes),
-            lambda: current.problem.transition(point, stood.at),
+        starts_of = (
+            lambda: beyond or current.problem.accumulation(self.changes),
+            lambda: beyond or current.problem.transition(point, stood.at),
         )
-        for start_of in starts:
+        for start_of in starts_of:
             start = start_of()
             if start is None:
                 continue
-            problem = set_parameters(
-                start.problem, as_arguments(start.problem.parameters, self.context.leaf)
-            )
+            given = as_arguments(start.problem.parameters, self.context.leaf)
+            problem = set_parameters(start.problem, given)
             waiting, label = list(self.pending), self.label
             try:
                 following = self.begin(

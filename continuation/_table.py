@@ -15,7 +15,7 @@ def table(
     every: int = 0,
     components: int = 3,
     shown: tuple[str, float] | None = None,
-    columns: Mapping[str, Callable[[Point], float | None]] | None = None,
+    columns: Mapping[str, Callable[[Point], complex | None]] | None = None,
 ) -> rich.table.Table:
     """Return a table of the special points, ends and some ordinary points of a branch.
 
@@ -70,11 +70,11 @@ def table(
 
 def _components(
     branch: Branch, most: int
-) -> dict[str, Callable[[Point], float | None]]:
+) -> dict[str, Callable[[Point], complex | None]]:
     """Return the columns of the norm and the first components of the state."""
     n = min(most, max((p.state.size for p in branch.points), default=0))
 
-    def component(k: int) -> Callable[[Point], float | None]:
+    def component(k: int) -> Callable[[Point], complex | None]:
         return lambda p: float(p.state[k]) if k < p.state.size else None
 
     norm = {"|u|": lambda p: float(np.linalg.norm(p.state))}

@@ -45,8 +45,8 @@ class AbstractProblem(eqx.Module):
 
     **Python** (called between compiled programs with concrete arrays): `monitors`,
     `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,
-    `signature`, `with_signature`, `padded`, `accumulation`. They may compile their own
-    programs.
+    `signature`, `with_signature`, `padded`, `accumulation`, `touching`. They may
+    compile their own programs.
 
     **Order of calls** for a step from point a to point b: first the corrector, then
     `derivatives` and `seen` at b in the same program. If a monitor with `ends` has
@@ -289,6 +289,11 @@ class AbstractProblem(eqx.Module):
             A `Start` at the accumulation, or None.
         """
         del points
+        return None
+
+    def touching(self, context: Any, at: Any, reach: float) -> Any:
+        """Return a grazing that two branches share, close ahead of `at`, or None."""
+        del context, at, reach
         return None
 
     def refreshed(self, u: np.ndarray, parameters: PyTree) -> "AbstractProblem":

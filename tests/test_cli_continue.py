@@ -4,6 +4,7 @@ import io
 import json
 import re
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 import continuation
 from jaxcam.cli import app
 from jaxcam.cli._axis import Axis
+from jaxcam.cli._continue import _columns
 from jaxcam.cli._output import Output
 from jaxcam.cli._source import Source
 from jaxcam.data import NEW_RIG
@@ -55,7 +57,8 @@ def test_branch_of_the_oscillator(tmp_path):
     assert first["kind"] == "grazing" and first["converged"]
     assert first["parameter"] == pytest.approx(amplitude, abs=1e-9)
     assert data["points"][0]["stable"] and data["points"][0]["parameter"] == 0.2
-    assert "grazing" in found.stdout
+    words = " ".join(found.stdout.split())
+    assert "grazing" in words and f"(end): {data['ended']}" in words
     assert {f.name for f in folder.iterdir()} >= {"branch.png", "branch.jsonl"}
     # nothing is left to do, and nothing is done again
     again = jaxcam(*arguments, "--json", file, "--out", folder, "--resume")
@@ -67,6 +70,19 @@ def test_branch_of_the_oscillator(tmp_path):
     refused = jaxcam(*arguments, "--out", folder)
     assert refused.exit_code == 2 and "add --resume" in refused.output
     assert len((folder / "branch.jsonl").read_text().splitlines()) == len(lines) - 1
+
+
+def test_the_largest_multiplier_has_its_sign():
+    """That of largest modulus, complex if it is one of a pair, none if unknown."""
+    largest = _columns(("x",))["largest multiplier"]
+
+    def shown(*multipliers):
+        return largest(SimpleNamespace(multipliers=np.array(multipliers, complex)))
+
+    assert shown(-1.25, 0.5) == -1.25
+    assert shown(-0.5 + 0.25j, -0.5 - 0.25j) == -0.5 + 0.25j
+    assert shown(-np.inf, 0.5) == -np.inf
+    assert shown(np.nan, np.nan) is None and shown() is None
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,9 @@ import continuation
 import jaxcam
 from continuation.orbits._event_changes import events_of, name_of_change
 from jaxcam.filippov.modes import surface_rates
-from jaxcam.hybrid import flow, Settings
+from jaxcam.hybrid import flow, Settings, SwitchedSystem
 from jaxcam.models import BeltOscillator, BouncingBall
+from jaxcam.parameters import as_arrays
 from jaxcam.thesis.chapter_2_dynamical_systems.figure_2_14 import sliding_events
 from variational.orbits import Event
 
@@ -69,6 +70,70 @@ def test_the_events_of_a_period_do_not_depend_on_its_start():
         seen.append(events_of(system, state, 0.0, period, settings))
     assert [len(one) for one in seen] == [3, 3]
     assert name_of_change(*seen) is None
+
+
+class TwoStops(SwitchedSystem):
+    """A forced oscillator between a rigid stop and a soft one."""
+
+    wall: float = 1.37
+    omega: float = 0.8
+
+    def switching(self, t, state):
+        return state[0] - 0.5
+
+    def branch(self, t, state, sides):
+        x, v = state
+        push = jnp.cos(self.omega * t) - jnp.where(sides[0] > 0, 2.0 * (x - 0.5), 0.0)
+        return jnp.stack([v, push - x - 0.2 * v])
+
+    def gap(self, t, state):
+        return state[0] + self.wall
+
+    def impact(self, t, state):
+        return state.at[1].multiply(-0.7)
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.omega
+
+
+@pytest.mark.slow
+def test_a_branch_passes_the_grazing_of_a_rigid_stop_next_to_a_soft_one():
+    """Grazing to 1e-9 from both sides, where the settled motion without the stop just
+    reaches it. The flip of the orbits with an impact is true; there is no other one.
+    """
+    free, settings = TwoStops(wall=5.0), Settings(tolerance=1e-12)
+    period = float(free.period)
+    state = jaxcam.simulate(free, [0.0, 0.0], 0.0, 60 * period, settings=settings).final
+    run = jaxcam.simulate(free, state, 0.0, period, settings=settings)
+    times = np.linspace(0.0, period, 1001)
+    for _ in range(3):
+        lowest = times[np.argmin(np.asarray(run.at(times))[:, 0])]
+        times = lowest + (times - times[500]) / 100
+    grazes = -float(run.at(np.array([lowest]))[0, 0])
+
+    one = jnp.ones(2)
+    system = as_arrays(TwoStops())
+    problem = continuation.SingleShooting(system, 0.0 * one[0], one, one, settings, 1)
+    start = continuation.Start(problem, np.asarray(state))
+    gains = continuation.branch(problem, start, "wall", (1.35, 1.37), direction=-1)
+    last = gains.points[-1]
+    start = continuation.Start(problem, last.state, last.parameter)
+    loses = continuation.branch(problem, start, "wall", (1.35, 1.37))
+    for found, kinds, impacts, word, bound in (
+        (gains, ["grazing", "flip"], [0, 1], "gains", 1.35),
+        (loses, ["flip", "grazing"], [1, 0], "loses", 1.37),
+    ):
+        assert [p.kind for p in found.special] == kinds
+        assert all(p.converged for p in found.points)
+        (grazing,) = found.of_kind("grazing")
+        assert grazing.parameter == pytest.approx(grazes, abs=1e-9)
+        assert grazing.stable is None and f"{word} an impact" in grazing.reason
+        counts = [int(p.observed["impacts"]) for p in found.regular]
+        assert list(dict.fromkeys(counts)) == impacts
+        assert found.points[-1].parameter == pytest.approx(bound)
+    flips = [found.of_kind("flip")[0].parameter for found in (gains, loses)]
+    assert flips[0] == pytest.approx(flips[1], abs=1e-9)
 
 
 def _sequence(*kinds):

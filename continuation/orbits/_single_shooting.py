@@ -9,12 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import flow, HybridSystem, Settings
+from jaxcam.hybrid import flow, HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.parameters import AnyArray
 from variational import Orbit
 
+from .._parameter import as_jax
+from .._point import with_field
+from .._touch import Touch
 from ..problem import AbstractProblem, Monitor, StabilityKind, Start
+from ..representation import Unique
 from ..special import FLIP, flip_direction
 from ._event_changes import (
     events_of,
@@ -22,6 +27,7 @@ from ._event_changes import (
     name_of_change,
     values_of_events,
 )
+from ._gap_grazing import touching
 
 
 # fraction of a period over which the direction of the motion is computed
@@ -42,9 +48,10 @@ class SingleShooting(AbstractProblem):
     or `"change of events"`. If the sequence changes twice in one step, the second
     change may be missed.
 
-    Where an impact grazes, the Jacobian is unbounded on one side; follow orbits of
-    systems without switching surfaces with [`continuation.ImpactingOrbits`][], which
-    locates grazing orbits exactly.
+    Where an impact grazes, the Jacobian is unbounded on one side. In a system with
+    switching surfaces, the grazing is therefore located with equations that are smooth
+    there, and the branch continues with one impact more or fewer. Follow orbits of
+    systems without switching surfaces with [`continuation.ImpactingOrbits`][].
 
     Examples:
         >>> import continuation
@@ -77,6 +84,8 @@ class SingleShooting(AbstractProblem):
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     turns: int = eqx.field(static=True, default=1)
     """Number of times that an orbit without forcing is traversed: 2 after a flip."""
+    passed: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
+    """Number of grazings of constraints that the branch has passed."""
 
     @staticmethod
     def of(
@@ -122,10 +131,23 @@ class SingleShooting(AbstractProblem):
         return u if self.periods else u[:-1]
 
     def residual(self, u, parameters) -> Float[Array, " u"]:
-        x = self.state(u)
-        times = self.times(u, parameters)
+        x, times = self.state(u), self.times(u, parameters)
         arrival = flow(parameters, x, *times, settings=self.settings)
-        off = jnp.where(arrival.code == 0, arrival.state - x, jnp.nan)
+        end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
+        return self.closing(end, u, parameters)
+
+    def closing(self, end, u, parameters) -> Float[Array, " u"]:
+        """Return the equations, given the state at the end of the period.
+
+        Args:
+            end: That state, shape `(n,)`.
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            Residuals, shape `(u,)`.
+        """
+        x = self.state(u)
+        off = end - x
         if self.periods:
             return off
         beside = jnp.dot(self.normal, (x - self.reference) / self._sizes(u, parameters))
@@ -202,7 +224,7 @@ class SingleShooting(AbstractProblem):
         del name
 
         def events(u, parameters):
-            parameters = jax.tree.map(_of_jax, parameters)
+            parameters = as_jax(parameters)
             u = jnp.asarray(u)
             times = self.times(u, parameters)
             return events_of(parameters, self.state(u), *times, self.settings)
@@ -221,6 +243,34 @@ class SingleShooting(AbstractProblem):
         return jnp.concatenate([x[None], jax.vmap(later)(parts)])
 
     # -- between compiled programs
+
+    def touching(self, context, at, reach: float) -> Touch | None:
+        """Return the grazing of a constraint within `reach` ahead of an orbit, or None.
+
+        Args:
+            context: Constants of the branch.
+            at: The orbit.
+            reach: Distance, measured like the length of a step.
+
+        Returns:
+            A `Touch`, or None.
+        """
+        if not isinstance(self.parameters, SwitchedSystem):
+            return None
+        return touching(self, context, at, reach)
+
+    def beyond(self) -> "SingleShooting":
+        """Return the same problem for the orbits beyond a grazing.
+
+        Returns:
+            A `SingleShooting`.
+        """
+        return with_field(self, "passed", np.asarray(float(self.passed) + 1.0))
+
+    @property
+    def representation(self) -> Unique:
+        """The representation of an orbit, whatever grazings its branch has passed."""
+        return Unique(f"single shooting periods {self.periods} turns {self.turns}")
 
     def refreshed(self, u, parameters) -> "SingleShooting":
         if self.periods:
@@ -254,18 +304,17 @@ class SingleShooting(AbstractProblem):
 
     @property
     def signature(self) -> str:
-        return f"single shooting periods {self.periods} turns {self.turns}"
+        passed = int(self.passed)
+        words = f" grazings {passed}" if passed else ""
+        return self.representation.family + words
 
     def with_signature(self, signature: str) -> AbstractProblem:
         words = signature.split()
-        if words[:2] != ["single", "shooting"] or len(words) != 6:
+        if words[:2] != ["single", "shooting"] or len(words) not in (6, 8):
             return super().with_signature(signature)
-        return dataclasses.replace(self, periods=int(words[3]), turns=int(words[5]))
-
-
-def _of_jax(leaf):
-    """Convert a NumPy array, such as a parameter varied by a branch, to a JAX array."""
-    return jnp.asarray(leaf) if isinstance(leaf, np.ndarray) else leaf
+        passed = np.asarray(float(words[7]) if len(words) == 8 else 0.0)
+        periods, turns = int(words[3]), int(words[5])
+        return dataclasses.replace(self, periods=periods, turns=turns, passed=passed)
 
 
 @program

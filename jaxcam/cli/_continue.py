@@ -1,6 +1,7 @@
 """`jaxcam continue`: follow a periodic orbit and find its bifurcations."""
 
 from collections.abc import Callable, Sequence
+from math import isinf, isnan
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -87,6 +88,9 @@ def continue_(
     shown = ("speed (rpm)", 1 / axis.unit) if axis.in_rpm else None
     columns = _columns(model.state_names)
     output.print(continuation.table(branch, shown=shown, columns=columns))
+    for point in branch.points:
+        if point.kind != "regular" and point.reason:
+            output.print(f"{point.label} ({point.kind}): {point.reason}")
     sentence = _sentence(system, branch, axis)
     output.print(sentence)
     output.print_figures(figures)
@@ -128,9 +132,9 @@ def _refuse_interrupted(path: Path) -> None:
             )
 
 
-def _columns(names: Sequence[str]) -> dict[str, Callable[[Any], float | None]]:
+def _columns(names: Sequence[str]) -> dict[str, Callable[[Any], complex | None]]:
     """Return the columns that describe an orbit: the state sampled at a whole forcing
-    period, and the largest modulus of the multipliers.
+    period, and the multiplier of largest modulus.
 
     **Arguments:** names of the state components.
     """
@@ -143,8 +147,12 @@ def _columns(names: Sequence[str]) -> dict[str, Callable[[Any], float | None]]:
         return value
 
     def largest(point):
-        sizes = [float(abs(m)) for m in point.multipliers]
-        return max(sizes, default=None)
+        first = max(point.multipliers, key=abs, default=None)
+        if first is None or isnan(abs(first)):
+            return None
+        # an infinite multiplier is real
+        plain = first.imag == 0 or isinf(abs(first))
+        return float(first.real) if plain else complex(first)
 
     found = {name: component(k) for k, name in enumerate(names[:3])}
     return found | {"largest multiplier": largest}
