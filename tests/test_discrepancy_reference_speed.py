@@ -12,8 +12,8 @@ from jaxcam.discrepancy.search import (
     Trials,
     with_fitted_speed,
 )
-from jaxcam.fitting import Parameter, Sensor
-from jaxcam.recordings import Recording, segment
+from jaxcam.fitting import Model, Parameter, segment_by_model, Sensor
+from jaxcam.recordings import Recording
 
 
 class Ball(HybridSystem):
@@ -55,13 +55,12 @@ def _height(time, height):
 
 @pytest.fixture(scope="module")
 def drops():
-    rng, time = np.random.default_rng(4), np.arange(720) / 240
-    parts = []
+    rng, time = np.random.default_rng(4), np.arange(400) / 240
+    runs = []
     for k, height in enumerate((1.9, 1.4, 1.0, 0.6)):
         noisy = _height(time, height) + _NOISE * rng.standard_normal(len(time))
-        run = Recording(f"drop{k}", time, {"height_m": noisy})
-        parts.append(segment(run, "height_m", noise=_NOISE))
-    return parts
+        runs.append(Recording(f"drop{k}", time, {"height_m": noisy}))
+    return segment_by_model(Model(Ball(), _SENSORS), runs, _PARAMETERS)
 
 
 @pytest.mark.slow
