@@ -311,13 +311,14 @@ class Run:
     def _transition(self, current, point: Point, stood: Solution, beyond=None):
         """Return the first solution beyond a point, or None and why the run ends."""
         self.changes.append(point)
-        towards = current.at.tangent[-1]
-        self.direction = 1 if towards >= 0 else -1
+        self.direction = 1 if current.at.tangent[-1] >= 0 else -1
         reason = f"{point.kind} ends the branch"
-        starts_of = (
-            lambda: beyond or current.problem.accumulation(self.changes),
-            lambda: beyond or current.problem.transition(point, stood.at),
+        starts_of: tuple = (
+            lambda: current.problem.accumulation(self.changes),
+            lambda: current.problem.transition(point, stood.at),
         )
+        if beyond is not None:
+            starts_of = (lambda: beyond,)
         for start_of in starts_of:
             start = start_of()
             if start is None:

@@ -27,7 +27,11 @@ class Touch(NamedTuple):
 
 
 def hits_differ(current: Solution, attempted: StepAttempt) -> bool:
-    """Return whether the numbers of impacts at both ends of a step differ by one."""
+    """Return whether the numbers of impacts at both ends of a step differ by one, in a
+    problem that can locate the grazing in between.
+    """
+    if not current.problem.may_touch:
+        return False
     after: Any = attempted.solution if attempted.at is None else attempted.at
     if after is None or "impacts" not in after.observed:
         return False

@@ -43,10 +43,9 @@ class AbstractProblem(eqx.Module):
     with `ends=False` must be smooth, except for monitors with `corner`; where an orbit
     does not exist, return NaN, and the step is halved.
 
-    **Python** (called between compiled programs with concrete arrays): `monitors`,
+    **Python** (called between compiled programs, with concrete arrays): `monitors`,
     `kind_of_zero`, `check`, `transition`, `refreshed`, `eigenvalues`, `representation`,
-    `signature`, `with_signature`, `padded`, `accumulation`, `touching`. They may
-    compile their own programs.
+    `signature`, `with_signature`, `padded`, `accumulation`, `touching`, `may_touch`.
 
     **Order of calls** for a step from point a to point b: first the corrector, then
     `derivatives` and `seen` at b in the same program. If a monitor with `ends` has
@@ -290,6 +289,11 @@ class AbstractProblem(eqx.Module):
         """
         del points
         return None
+
+    @property
+    def may_touch(self) -> bool:
+        """Whether `touching` may find a grazing."""
+        return False
 
     def touching(self, context: Any, at: Any, reach: float) -> Any:
         """Return a grazing that two branches share, close ahead of `at`, or None."""

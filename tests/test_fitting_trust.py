@@ -17,7 +17,7 @@ from jaxcam.fitting.engine._pieces import FREE, IMPACT, spans
 from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import Recording, segment
 from jaxcam.recordings.cut import Boundary, Flight
-from jaxcam.recordings.cut._segments import no_impacts, Segments
+from jaxcam.recordings.cut._segments import impacts_of, Segments
 
 
 NOISE = 1.2e-4
@@ -200,7 +200,7 @@ def test_a_bounce_of_few_samples_ties_the_flights_on_both_sides():
         Flight(start, hits[0], 0, 30, 0.3),
         Flight(hits[0], hits[1], 30, 36, 0.01),
     )
-    part = Segments(record, "h", noise, time, flights, (), no_impacts())
+    part = Segments(record, "h", noise, time, flights, (), impacts_of([]))
     flown = spans(part)[0]
     assert [span.joint for span in flown] == [FREE, IMPACT]
     assert len(flown[1].rows) < 8

@@ -244,6 +244,11 @@ class SingleShooting(AbstractProblem):
 
     # -- between compiled programs
 
+    @property
+    def may_touch(self) -> bool:
+        """Whether `touching` may find a grazing: with switching surfaces and gaps."""
+        return isinstance(self.parameters, SwitchedSystem)
+
     def touching(self, context, at, reach: float) -> Touch | None:
         """Return the grazing of a constraint within `reach` ahead of an orbit, or None.
 
@@ -255,7 +260,7 @@ class SingleShooting(AbstractProblem):
         Returns:
             A `Touch`, or None.
         """
-        if not isinstance(self.parameters, SwitchedSystem):
+        if not self.may_touch:
             return None
         return touching(self, context, at, reach)
 

@@ -200,6 +200,9 @@ def _answered(
         folder = None if keep is None else keep / "with_fitted_speed"
         trials = conditions.trials(question, folder)
         search = Search(trials)
+        # known even if no time is left for the second search
+        trials.attempt(frozenset(), None)
+        trials.attempt(best.names, best, policy.iterations)
         best = search.run()
     bare, rough = trials.known[frozenset()], None
     far = far_from_data(bare.fit, best.fit, policy)

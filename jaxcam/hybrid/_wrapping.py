@@ -14,7 +14,8 @@ class Wrapping(HybridSystem):
 
     Subclass it to change some of the functions of any system: store the system in a
     field and return it from the property `inner`. Override a declaration only if it
-    differs from that of the inner system.
+    differs from that of the inner system. Around a `SwitchedSystem`, the subclass must
+    be one as well; otherwise, it has no switching surfaces.
 
     Examples:
         >>> from jaxcam.hybrid import Wrapping

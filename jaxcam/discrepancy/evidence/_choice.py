@@ -63,9 +63,17 @@ def choose(
     policy, textbook = trials.policy, trials.known[frozenset()]
     named = supported(question, trials, found, seed)
     separate = _separate_values(trials, named, textbook)
-    functions = Unnamed()
+    functions, useless, by_functions = Unnamed(), None, None
     if named.left and unnamed and policy.functions and not separate.settled:
         functions = without_a_name(question, trials, named.best, named.left, seed)
+    if functions.found is not None:
+        missing = functions.found
+        bare, rest = (
+            _within(trials, textbook, one.fit) for one in (missing, named.best)
+        )
+        by_functions = held_out(trials, bare, trial_of(missing))
+        useless = rejected(trials, missing, by_functions, rest, named.best)
+        functions = functions if useless is None else Unnamed()
     fewest = _fewest(separate, named.best.bic, policy) if named.left else None
     if fewest is not None and fewest.bic < functions.score - policy.tie:
         # no function common to the recordings explains as much
@@ -78,22 +86,15 @@ def choose(
         if fewest is not None and fewest is separate.instead:
             # the terms only imitated the differences
             different, named = fewest, named.textbook(trials, textbook, seed)
-    best, useless = named.best, None
-    before, held = _within(trials, textbook, best.fit), named.held
-    missing = functions.found
-    if missing is not None:
-        bare = _within(trials, textbook, missing.fit)
-        by_functions = held_out(trials, bare, trial_of(missing))
-        useless = rejected(trials, missing, by_functions, before, best)
-        if useless is None:
-            before, held = bare, by_functions
-            different = differing(missing.fit, policy)
-        else:
-            functions, held = Unnamed(), useless.named
+    if functions.found is not None:
+        before, held = _within(trials, textbook, functions.found.fit), by_functions
+        different = differing(functions.found.fit, policy)
+    else:
+        before, held = _within(trials, textbook, named.best.fit), named.held
     return Choice(
         named=named,
         before=before,
-        held=held or held_out(trials, before, best),
+        held=held or held_out(trials, before, named.best),
         unnamed=functions,
         rejected=useless,
         differing=different,

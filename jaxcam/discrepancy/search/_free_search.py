@@ -166,7 +166,10 @@ class FreeSearch:
         one.
         """
         self.progress(f"fitting {spelled(lead.label)} instead", None)
-        return self._with(self.problem, bare, lead)
+        found = self._with(self.problem, bare, lead)
+        if found is not None:
+            self.tried.append(found)
+        return found
 
     def lacks_element(self, found: Missing | None) -> bool:
         """Return whether to repeat the search with elements among the candidates.
@@ -222,7 +225,9 @@ class FreeSearch:
                 said = spelled(lead.label)
                 self.progress(f"fitting {said}", None)
                 trial = self._with(problem, found, lead)
-                if trial is not None and apart and leads is self.first:
+                if trial is not None and not apart:
+                    self.tried.append(trial)
+                elif trial is not None and leads is self.first:
                     self.alone[lead.label] = trial.fit.cost
                 if trial is not None and trial.score < best.score:
                     best = trial
@@ -305,11 +310,7 @@ class FreeSearch:
             point, functions = trial.fit.point, trial.functions
         if trial is None or problem is not self.apart:
             trial = self.fits.fitted(Subset(problem, functions, names), point)
-        if not math.isfinite(trial.score):
-            return None
-        if problem is self.problem:
-            self.tried.append(trial)
-        return trial
+        return trial if math.isfinite(trial.score) else None
 
     def _swapped(self, found: Missing) -> Missing:
         """Replace earlier functions by terms that explain more.

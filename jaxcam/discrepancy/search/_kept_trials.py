@@ -9,12 +9,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ...fitting import Problem
 from ...fitting.engine import Point
 from ..policy import Policy
+from ..terms import terms_of
 
 
 # exceptions raised by numpy for foreign or damaged files
@@ -96,6 +98,9 @@ def _mark_of(problem: Problem, policy: Policy) -> str:
     policy = dataclasses.replace(policy, minutes=Policy().minutes)
     found = hashlib.sha256(repr((problem.names, policy)).encode())
     found.update(np.asarray(problem.start.values).tobytes())
+    # constants of terms, such as a reference speed that was fitted
+    for leaf in jax.tree.leaves(terms_of(problem.model)):
+        found.update(np.asarray(leaf, dtype=float).tobytes())
     for part in problem.segments:
         found.update(part.recording.name.encode())
         found.update(np.ascontiguousarray(part.recording.time).tobytes())

@@ -27,9 +27,12 @@ def with_fitted_speed(
     with a frequency take no part, because they may only imitate the error of the form.
     """
     term = next((t for t in question.terms if _unstated(t, question, best)), None)
-    speeds = np.concatenate([p.impacts.approach for p in question.problem.segments])
+    if term is None or question.relisted is None or trials.clock.over:
+        return None
+    every = [p.impacts for p in question.problem.segments]
+    speeds = np.concatenate([i.approach[i.side == term.constraint] for i in every])
     speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
-    if term is None or question.relisted is None or not len(speeds):
+    if not len(speeds):
         return None
     trials.progress("fitting the reference speed", None)
     start = _with_strengths_only(trials, best)

@@ -38,6 +38,10 @@ def about_system(system) -> Any:
     return _plain(system)
 
 
+# how far the objects that a function uses are followed
+_DEPTH = 4
+
+
 def digest(array) -> dict[str, Any]:
     """Describe an array by its shape and a hash, if it is too long to be listed."""
     array = np.ascontiguousarray(np.asarray(array, dtype=float))
@@ -60,8 +64,10 @@ def _about_function(function: Any) -> Any:
     if not isinstance(inner, types.FunctionType):
         return name
     cells = [_content(cell) for cell in inner.__closure__ or ()]
-    defaults = [inner.__defaults__, inner.__kwdefaults__]
-    about = [_code(inner.__code__), *map(_constant, cells), *map(_constant, defaults)]
+    # the object of a bound method
+    own = getattr(function, "__self__", None)
+    used = [*cells, inner.__defaults__, inner.__kwdefaults__, own]
+    about = [_code(inner.__code__, _DEPTH), *(_constant(one, _DEPTH) for one in used)]
     return {
         "function": name,
         "sha256": hashlib.sha256(json.dumps(about).encode()).hexdigest(),
@@ -76,32 +82,38 @@ def _content(cell: types.CellType) -> Any:
         return None
 
 
-def _code(code: types.CodeType) -> list:
+def _code(code: types.CodeType, depth: int) -> list:
     """Describe compiled code, without the names of files and the line numbers."""
-    constants = [_constant(value) for value in code.co_consts]
+    constants = [_constant(value, depth) for value in code.co_consts]
     return [code.co_code.hex(), constants, list(code.co_names)]
 
 
-def _constant(value: Any) -> Any:
-    """Describe a constant of a function, or a variable that it closes over."""
-    if isinstance(value, types.CodeType):
-        return _code(value)
-    if isinstance(value, tuple | list):
-        return [_constant(one) for one in value]
-    if isinstance(value, dict):
-        return {str(k): _constant(one) for k, one in value.items()}
-    if isinstance(value, frozenset | set):
-        # their order differs between processes
-        return sorted(json.dumps(_constant(one)) for one in value)
-    if isinstance(value, jax.Array | np.ndarray | np.generic):
-        return np.asarray(value).tolist()
-    # not followed further, because functions can refer to each other
-    inner = getattr(value, "__code__", None)
-    if inner is not None:
-        return _code(inner)
+def _constant(value: Any, depth: int) -> Any:
+    """Describe a constant of a function, or a variable that it closes over.
+
+    Objects are followed to a `depth`, because they can refer to each other.
+    """
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return repr(value)
-    return type(value).__name__
+    if isinstance(value, jax.Array | np.ndarray | np.generic):
+        return repr(np.asarray(value).tolist())
+    if depth == 0 or isinstance(value, type | types.ModuleType):
+        return getattr(value, "__name__", type(value).__name__)
+    if isinstance(value, types.CodeType):
+        return _code(value, depth - 1)
+    if isinstance(value, tuple | list):
+        return [_constant(one, depth - 1) for one in value]
+    if isinstance(value, dict):
+        return {str(k): _constant(one, depth - 1) for k, one in value.items()}
+    if isinstance(value, frozenset | set):
+        # their order differs between processes
+        return sorted(json.dumps(_constant(one, depth - 1)) for one in value)
+    if isinstance(value, types.FunctionType):
+        cells = [_content(cell) for cell in value.__closure__ or ()]
+        about = [_constant(one, depth - 1) for one in cells]
+        return [_code(value.__code__, depth - 1), about]
+    about = _constant(getattr(value, "__dict__", {}), depth - 1)
+    return [type(value).__name__, about]
 
 
 def _plain(value: Any) -> Any:
