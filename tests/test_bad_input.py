@@ -111,7 +111,6 @@ def test_meaningless_settings(settings, word):
     assert f"{word} is" in refusal(BouncingBall(), ABOVE, settings=settings)
 
 
-@pytest.mark.usefixtures("unchecked_types")
 @pytest.mark.parametrize(
     "options", [{"tolerance": 1e-6}, {"solver": diffrax.Tsit5()}, {"max_step": 0.1}]
 )
@@ -126,6 +125,7 @@ def test_flow_checks_its_settings():
         flow(BouncingBall(), ABOVE, 0.0, 1.0, settings=Settings(tolerance=-1.0))
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_unknown_engine():
     text = refusal(BouncingBall(), ABOVE, engine="leapfrog")
     assert "'leapfrog'" in text and '"loop" or "diffeqsolve"' in text

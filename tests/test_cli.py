@@ -201,7 +201,7 @@ def test_interrupted_run_says_so(monkeypatch):
         ("demo --case DEGREES --rig RIG", "degrees"),
         ("demo --case GAPS --rig RIG", "--gaps split"),
         ("demo --case WHOLE", "--rig"),
-        ("demo --rig FOLDER/nowhere", "no such file"),
+        ("demo --rig FOLDER/nowhere", "does not exist"),
         ("demo --rig FILE", "TOML"),
         ("demo --out FILE", "folder"),
         ("demo --gaps ignore", "refuse, split"),

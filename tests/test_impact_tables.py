@@ -237,7 +237,7 @@ def test_the_command(tmp_path):
         (["--columns", "a=b,c"], "only pairs"),
         (["--columns", "v1=x*0"], "only pairs"),
         (["--rate", "0"], "--rate is 0"),
-        ([], "`time_s` is missing"),
+        ([], "no rig.toml"),
     ):
         found = command("fit", file, *words)
         assert found.exit_code == 2 and said in found.stderr

@@ -18,10 +18,15 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
     """
     from ..fitting import is_setup, read_setup
     from ..recordings import read_rig
-    from ..recordings.files import CAM_FOLLOWER, read_layout, read_tables
+    from ..recordings.files import (
+        CAM_FOLLOWER,
+        has_recordings,
+        read_layout,
+        read_tables,
+    )
 
     folder = case.parent if case.is_file() else case
-    if case.exists():
+    if case.is_file() or has_recordings(case):
         # without its rig file, a recording of any rig would seem to be one of a
         # cam-follower that lacks channels
         _rig_file(folder, rig)

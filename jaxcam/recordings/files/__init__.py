@@ -7,6 +7,7 @@ from ._choose import Columns as Columns
 from ._mend import mend as mend, Mended as Mended
 from ._read import (
     CAM_FOLLOWER as CAM_FOLLOWER,
+    has_recordings as has_recordings,
     read_case as read_case,
     read_recording as read_recording,
     read_recordings as read_recordings,

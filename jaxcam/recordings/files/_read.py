@@ -179,7 +179,7 @@ def read_case(
             f"{folder}: this is a file, but a case is a folder of recordings; give the "
             "folder that contains it."
         )
-    files = _tables(folder, SUFFIXES) or _tables(folder, _LAST_RESORT)
+    files = _files_of(folder)
     if not files:
         cases = sorted(sub.name for sub in folder.iterdir() if sub.is_dir())
         hint = f"; give one of its folders ({', '.join(cases[:4])})" if cases else ""
@@ -245,6 +245,15 @@ def _noted(piece: Recording, notes: tuple[str, ...]) -> Recording:
         return piece
     said = (*notes, *piece.meta.get("notes", ()))
     return dataclasses.replace(piece, meta={**piece.meta, "notes": said})
+
+
+def has_recordings(folder: Path) -> bool:
+    """Return whether a folder contains files that may be recordings."""
+    return folder.is_dir() and bool(_files_of(folder))
+
+
+def _files_of(folder: Path) -> list[Path]:
+    return _tables(folder, SUFFIXES) or _tables(folder, _LAST_RESORT)
 
 
 def _tables(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
