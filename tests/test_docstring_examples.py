@@ -220,7 +220,7 @@ def _before(name: str) -> dict:
 )
 def test_an_example_prints_what_is_shown(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = r"example\s+continues\s+that\s+of\s+\[`([\w.]+)`\]"
+    told = r"example\s+continues\s+the\s+one\s+in\s+\[`([\w.]+)`\]"
     continued = re.search(told, _doc(DEFINED[name]))
     _run(name, {**GIVEN, **(_before(continued[1]) if continued else {})})
     plt.close("all")
