@@ -12,72 +12,28 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import flow, HybridSystem, SwitchedSystem, Wrapping
+from jaxcam.hybrid import flow, SwitchedSystem, SwitchedWrapping
 from jaxcam.hybrid.programs import program
-from jaxcam.hybrid.surface import gaps, has_friction, impacts, normal_velocity
+from jaxcam.hybrid.surface import gaps, impacts, normal_velocity
 
 from .._parameter import with_leaf
 
 
-class WithLiftedGaps(Wrapping, SwitchedSystem):
+class WithLiftedGaps(SwitchedWrapping):
     """A system with switching surfaces whose constraints are moved away."""
 
     system: SwitchedSystem
     lifts: Float[Array, " m"]
 
     @property
-    def inner(self) -> HybridSystem:
+    def inner(self) -> SwitchedSystem:
         """Return the system."""
         return self.system
-
-    def switching(self, t, state):
-        """Return the switching functions of the system."""
-        return self.system.switching(t, state)
-
-    def branch(self, t, state, sides):
-        """Return the rates of the system."""
-        return self.system.branch(t, state, sides)
-
-    def sides(self, t, state):
-        """Return the sides of the system."""
-        return self.system.sides(t, state)
-
-    def reset(self, t, state, sides):
-        """Return the states after the resets of the system."""
-        return self.system.reset(t, state, sides)
 
     def gap(self, t, state):
         """Return the gaps of the system plus the lifts."""
         own = self.system.gap(t, state)
         return own + jnp.reshape(self.lifts, jnp.shape(own))
-
-    def impact(self, t, state):
-        """Return the states after the impacts of the system."""
-        return self.system.impact(t, state)
-
-    @property
-    def hysteresis(self) -> Any:
-        """Return the hysteresis of the system."""
-        return self.system.hysteresis
-
-    @property
-    def holding(self) -> Any:
-        """Return the ratio of static to kinetic friction."""
-        return self.system.holding
-
-    @property
-    def has_contact_friction(self) -> bool:
-        """Return whether the contacts of the system have friction."""
-        return has_friction(self.system)
-
-    def contact_friction(self, t, state, sides):
-        """Return the friction of each contact of the system."""
-        return self.system.contact_friction(t, state, sides)
-
-    @property
-    def restitution_kind(self):
-        """Return the meaning of the coefficient of restitution of the system."""
-        return self.system.restitution_kind
 
 
 class Window(eqx.Module):

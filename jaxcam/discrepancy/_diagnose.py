@@ -201,7 +201,6 @@ def _answered(
         trials = conditions.trials(question, folder)
         search = Search(trials)
         # known even if no time is left for the second search
-        trials.attempt(frozenset(), None)
         trials.attempt(best.names, best, policy.iterations)
         best = search.run()
     bare, rough = trials.known[frozenset()], None

@@ -245,7 +245,9 @@ class Policy:
         4, "maximum number of fits of a free function in which its prior must converge"
     )
     element_fits: int = bounds(
-        12, "maximum number of additional fits for the parameters of an element"
+        12,
+        "maximum number of additional fits for the parameters of an element, or for a "
+        "reference speed",
     )
     prior_settled: float = bounds(
         1.5, "ratio of consecutive costs below which the prior has converged"

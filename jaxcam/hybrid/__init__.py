@@ -12,7 +12,7 @@ from ._simulate import simulate as simulate
 from ._stroboscope import stroboscope as stroboscope
 from ._switched import SwitchedSystem as SwitchedSystem
 from ._system import HybridSystem as HybridSystem
-from ._wrapping import Wrapping as Wrapping
+from ._wrapping import SwitchedWrapping as SwitchedWrapping, Wrapping as Wrapping
 from .caches import clear_caches as clear_caches
 from .codes import RESULTS as RESULTS
 from .record import Trajectory as Trajectory

@@ -5,6 +5,7 @@ from typing import Any
 
 import equinox as eqx
 
+from ._switched import SwitchedSystem
 from ._system import HybridSystem
 
 
@@ -14,8 +15,8 @@ class Wrapping(HybridSystem):
 
     Subclass it to change some of the functions of any system: store the system in a
     field and return it from the property `inner`. Override a declaration only if it
-    differs from that of the inner system. Around a `SwitchedSystem`, the subclass must
-    be one as well; otherwise, it has no switching surfaces.
+    differs from that of the inner system. Around a `SwitchedSystem`, use
+    `SwitchedWrapping`; otherwise, there are no switching surfaces.
 
     Examples:
         >>> from jaxcam.hybrid import Wrapping
@@ -85,3 +86,76 @@ class Wrapping(HybridSystem):
         value.
         """
         self.inner.check()
+
+
+class SwitchedWrapping(Wrapping, SwitchedSystem):
+    """A system that contains a `SwitchedSystem`, `inner`, and keeps its switching
+    surfaces, branches, resets and contact friction as well.
+
+    Examples:
+        >>> from jaxcam.hybrid import SwitchedWrapping
+        >>> from jaxcam.models import BilinearOscillator
+        >>> class Braked(SwitchedWrapping):
+        ...     base: jaxcam.SwitchedSystem
+        ...     @property
+        ...     def inner(self):
+        ...         return self.base
+        ...     def branch(self, t, state, sides):
+        ...         braking = jnp.stack([0.0, -0.1 * state[1]])
+        ...         return self.base.branch(t, state, sides) + braking
+        >>> Braked(BilinearOscillator()).switching(0.0, jnp.array([0.5, 0.0])).shape
+        ()
+    """
+
+    @property
+    @abc.abstractmethod
+    def inner(self) -> SwitchedSystem:
+        """Return the system inside."""
+
+    def switching(self, t, state):
+        """Return the switching functions of the inner system."""
+        return self.inner.switching(t, state)
+
+    def branch(self, t, state, sides):
+        """Return the rates of the inner system."""
+        return self.inner.branch(t, state, sides)
+
+    def sides(self, t, state):
+        """Return the sides of the inner system."""
+        return self.inner.sides(t, state)
+
+    def reset(self, t, state, sides):
+        """Return the states after the resets of the inner system."""
+        return self.inner.reset(t, state, sides)
+
+    def gap(self, t, state):
+        """Return the gaps of the inner system."""
+        return self.inner.gap(t, state)
+
+    def impact(self, t, state):
+        """Return the states after the impacts of the inner system."""
+        return self.inner.impact(t, state)
+
+    @property
+    def hysteresis(self) -> Any:
+        """Return the hysteresis of each surface."""
+        return self.inner.hysteresis
+
+    @property
+    def holding(self) -> Any:
+        """Return the ratio of static to kinetic friction at each surface."""
+        return self.inner.holding
+
+    @property
+    def has_contact_friction(self) -> bool:
+        """Return whether the contacts have friction."""
+        return self.inner.has_contact_friction
+
+    def contact_friction(self, t, state, sides):
+        """Return the friction of each contact."""
+        return self.inner.contact_friction(t, state, sides)
+
+    @property
+    def restitution_kind(self):
+        """Return the meaning of the coefficient of restitution."""
+        return self.inner.restitution_kind

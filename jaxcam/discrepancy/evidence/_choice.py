@@ -63,17 +63,19 @@ def choose(
     policy, textbook = trials.policy, trials.known[frozenset()]
     named = supported(question, trials, found, seed)
     separate = _separate_values(trials, named, textbook)
-    functions, useless, by_functions = Unnamed(), None, None
+    functions, useless, predicted = Unnamed(), None, None
     if named.left and unnamed and policy.functions and not separate.settled:
         functions = without_a_name(question, trials, named.best, named.left, seed)
+    rest = _within(trials, textbook, named.best.fit)
     if functions.found is not None:
         missing = functions.found
-        bare, rest = (
-            _within(trials, textbook, one.fit) for one in (missing, named.best)
-        )
-        by_functions = held_out(trials, bare, trial_of(missing))
-        useless = rejected(trials, missing, by_functions, rest, named.best)
-        functions = functions if useless is None else Unnamed()
+        bare = _within(trials, textbook, missing.fit)
+        held = held_out(trials, bare, trial_of(missing))
+        useless = rejected(trials, missing, held, rest, named.best)
+        predicted = bare, held
+    if useless is not None:
+        functions = Unnamed()
+        named = dataclasses.replace(named, held=useless.named)
     fewest = _fewest(separate, named.best.bic, policy) if named.left else None
     if fewest is not None and fewest.bic < functions.score - policy.tie:
         # no function common to the recordings explains as much
@@ -86,11 +88,11 @@ def choose(
         if fewest is not None and fewest is separate.instead:
             # the terms only imitated the differences
             different, named = fewest, named.textbook(trials, textbook, seed)
-    if functions.found is not None:
-        before, held = _within(trials, textbook, functions.found.fit), by_functions
+            rest = textbook
+    before, held = rest, named.held
+    if functions.found is not None and predicted is not None:
+        before, held = predicted
         different = differing(functions.found.fit, policy)
-    else:
-        before, held = _within(trials, textbook, named.best.fit), named.held
     return Choice(
         named=named,
         before=before,

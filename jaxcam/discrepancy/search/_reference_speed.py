@@ -56,6 +56,7 @@ def with_fitted_speed(
         options={"maxiter": policy.element_fits},
     )
     price = math.log(trials.problem.samples) + policy.tie
+    # with as many iterations as the others
     usual = fitted(math.log(getattr(question.references, term.reference_speed))).cost
     if not found.fun + price < usual:
         return None

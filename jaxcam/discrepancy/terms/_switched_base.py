@@ -2,40 +2,17 @@
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from ...hybrid import HybridSystem, SwitchedSystem
+from ...hybrid import HybridSystem, SwitchedSystem, SwitchedWrapping
 from ._hidden_elements import HiddenElement
 from ._term import Term
 from ._with_hidden import WithHidden
 from ._with_terms import WithTerms
 
 
-class _Around(SwitchedSystem):
-    """A switched system with the surfaces of its base."""
-
-    base: eqx.AbstractVar[SwitchedSystem]
-
-    @property
-    def hysteresis(self):
-        return self.base.hysteresis
-
-    @property
-    def holding(self):
-        return self.base.holding
-
-    @property
-    def restitution_kind(self):
-        return self.base.restitution_kind
-
-    @property
-    def has_contact_friction(self) -> bool:
-        return self.base.has_contact_friction
-
-
-class SwitchedWithTerms(WithTerms, _Around):
+class SwitchedWithTerms(WithTerms, SwitchedWrapping):
     """A switched system and terms added to each of its branches."""
 
     base: SwitchedSystem
@@ -44,23 +21,11 @@ class SwitchedWithTerms(WithTerms, _Around):
     def vector_field(self, t, state) -> jax.Array:
         return self.branch(t, state, self.sides(t, state))
 
-    def switching(self, t, state):
-        return self.base.switching(t, state)
-
     def branch(self, t, state, sides) -> jax.Array:
         return self._pushed(t, state, self.base.branch(t, state, sides))
 
-    def sides(self, t, state):
-        return self.base.sides(t, state)
 
-    def contact_friction(self, t, state, sides):
-        return self.base.contact_friction(t, state, sides)
-
-    def reset(self, t, state, sides):
-        return self.base.reset(t, state, sides)
-
-
-class SwitchedWithHidden(WithHidden, _Around):
+class SwitchedWithHidden(WithHidden, SwitchedWrapping):
     """A switched system with an element that has an internal state; this state does not
     change at the switching surfaces.
     """
