@@ -156,7 +156,7 @@ class Policy:
 
     # settings that limit the search
     minutes: float = bounds(
-        20.0, "time of a search (min) after which no further candidate is tried"
+        20.0, "time (min, without other programs) after which no candidate is tried"
     )
     quick_iterations: int = bounds(
         15, "maximum iterations in the first fit of a subset"
