@@ -26,6 +26,7 @@ from ..search import (
     Periodogram,
     predicted_gain,
     Response,
+    separate_gain,
 )
 from ..terms import Shape, shapes, Term, terms_of, Where
 from ._visited_states import visited_states, VisitedStates
@@ -90,6 +91,9 @@ class Structure:
     in time."""
     quantity: str = ""
     """The quantity that `value` describes."""
+    differs: bool = False
+    """Whether it certainly differs from recording to recording: with a value of its own
+    in each recording, it explains significantly more."""
 
     @property
     def significant(self) -> bool:
@@ -140,6 +144,7 @@ def structures(
     others = [t for t in more if not any(t is force for force in forces)]
     wide = extended(problem, others, found.point)
     tests = len(more) + 2
+    chance, heat = policy.false_alarms / tests, max(1.0, found.cost / problem.samples)
     made = []
     for terms, blocks, place in (
         (forces, force_blocks(problem, response, forces), 0),
@@ -154,9 +159,12 @@ def structures(
             )
             threshold = _threshold(len(own), problem.samples, tests, policy)
             shape = _shape(term, blocks, information, score, free, own, seen, policy)
-            predicted = math.inf
+            predicted, differs = math.inf, False
             if grown > threshold:
                 predicted = predicted_gain(blocks, free, own, policy)
+            if predicted <= 0:
+                more_gain, number = separate_gain(blocks, free, own, policy)
+                differs = more_gain > heat * chi2.isf(chance, max(number, 1))
             made.append(
                 Structure(
                     term.name,
@@ -168,6 +176,7 @@ def structures(
                     len(own),
                     **shape,
                     predicted_gain=predicted,
+                    differs=bool(differs),
                     form=Form.FUNCTION if isinstance(term, Shape) else Form.TERM,
                 )
             )
@@ -257,6 +266,7 @@ def _vibration(
         _threshold(count, problem.samples, tests, policy, scan.cells),
         count,
         predicted_gain=seen,
+        differs=seen <= 0,
         form=Form.VIBRATION,
     )
 

@@ -4,7 +4,16 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, Differing, HeldOut, Outside, Rejected, Rival, rms_of
+from ..evidence import (
+    Choice,
+    Differing,
+    HeldOut,
+    not_shared,
+    Outside,
+    Rejected,
+    Rival,
+    rms_of,
+)
 from ..policy import Policy
 from ..search import Question, Trial, Trials
 from ._words import listed, number, percent, quantity, ratio, spelled
@@ -68,11 +77,7 @@ def caveats_of(
         yield _far(trials)
     for trial in ties:
         yield _tie(choice.named.best, trial)
-    apart = [
-        s
-        for s in choice.named.left_after
-        if s.gain > s.threshold and s.predicted_gain <= 0
-    ]
+    apart = not_shared(choice, trials.policy)
     explained = choice.differing is not None and choice.differing.complete
     if apart and not explained:
         yield Caveat(
