@@ -5,7 +5,7 @@ occur.
 import dataclasses
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -29,6 +29,7 @@ from ..search import (
     separate_gain,
 )
 from ..terms import Shape, shapes, Term, terms_of, Where
+from ._imitation import Beside, beside_structure
 from ._visited_states import visited_states, VisitedStates
 
 
@@ -94,6 +95,9 @@ class Structure:
     differs: bool = False
     """Whether it certainly differs from recording to recording: with a value of its own
     in each recording, it explains significantly more."""
+    named: Mapping[str, Beside] = dataclasses.field(default_factory=dict)
+    """Far from the data, for each named term, what is lost without it: as the fit is,
+    and if the structure is fitted as well."""
 
     @property
     def significant(self) -> bool:
@@ -121,13 +125,15 @@ def structures(
     references: References,
     unit: str,
     policy: Policy,
+    parts: Mapping[str, Sequence[str]],
 ) -> list[Structure]:
     """Test the residuals of a fit for structures, and return them with the largest
     excess first.
 
     **Arguments:** the fit, the response to a force about it, terms that only describe
     an unknown effect, the periodogram of the residuals, whether there is a drive, the
-    constants of the shapes, the unit of the motion, and the policy.
+    constants of the shapes, the unit of the motion, the policy, and the parameters of
+    each named term.
     """
     problem, seen = found.problem, visited_states(found.problem)
     more: tuple[Term, ...] = (
@@ -165,6 +171,9 @@ def structures(
             if predicted <= 0:
                 more_gain, number = separate_gain(blocks, free, own, policy)
                 differs = more_gain > heat * chi2.isf(chance, max(number, 1))
+            named = {}
+            if grown > threshold and predicted > 0 and heat > policy.near_cost:
+                named = beside_structure(found, blocks, free, own, parts)
             made.append(
                 Structure(
                     term.name,
@@ -177,6 +186,7 @@ def structures(
                     **shape,
                     predicted_gain=predicted,
                     differs=bool(differs),
+                    named=named,
                     form=Form.FUNCTION if isinstance(term, Shape) else Form.TERM,
                 )
             )

@@ -13,13 +13,19 @@ class Clock:
     """
 
     def __init__(self, minutes: float):
-        self._end = time.monotonic() + 60 * minutes
+        self._begun, self._span = time.monotonic(), 60 * minutes
         # whether a candidate was left out because the time was over
         self.stopped = False
 
     @property
     def over(self) -> bool:
         """Whether the time is over; a caller who asks then leaves a candidate out."""
-        if time.monotonic() > self._end:
-            self.stopped = True
-        return self.stopped
+        return self.past(1.0)
+
+    def past(self, share: float) -> bool:
+        """Return whether a share of the time is over; a caller who asks then leaves a
+        candidate out.
+        """
+        late = time.monotonic() > self._begun + share * self._span
+        self.stopped |= late
+        return late
