@@ -92,3 +92,10 @@ def test_the_rate_of_a_gap_is_computed_from_the_channels_of_a_model():
     assert both.impacts.time == pytest.approx(hits, abs=INTERVAL)
     (alone,) = segment_by_model(Model(ball, {"height_m": sensors["height_m"]}), [moved])
     assert alone.impacts.count < len(hits)
+    # the slopes of a saturated velocity say nothing about an impact
+    limited = np.clip(channels["velocity_m_s"], -1.0, 1.0)
+    (cut,) = segment_by_model(
+        Model(ball, sensors),
+        [Recording("ball", run.time, channels | {"velocity_m_s": limited})],
+    )
+    assert np.array_equal(cut.impacts.time, alone.impacts.time)

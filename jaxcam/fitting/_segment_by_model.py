@@ -12,7 +12,14 @@ from jaxtyping import Float
 from ..hybrid.programs import program
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
-from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
+from ..recordings.cut import (
+    Drive,
+    padded,
+    read_drive,
+    saturated,
+    segment_gaps,
+    Segments,
+)
 from ._gap_rates import gap_rates
 from ._missed_impacts import Spans, with_missed_impacts
 from .engine import (
@@ -42,9 +49,9 @@ def segment_by_model(
 
     A gap is computed from the measured components of the state and shifted so that it
     is zero where its velocity jumps, as far as the tolerances of the parameters allow.
-    If channels also measure the velocities that the rate of change of a gap depends on,
-    impacts are jumps of this rate, and contacts are stretches in which it is zero.
-    If the system has no gap, each recording is one flight.
+    If channels that do not saturate also measure the velocities that the rate of change
+    of a gap depends on, impacts are jumps of this rate, and contacts are stretches in
+    which it is zero. If the system has no gap, each recording is one flight.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts
@@ -189,8 +196,9 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None, pick
     # times infinity
     parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
     rates: list = [None] * len(gaps)
+    clear = [k for k, name in picks.items() if not np.any(saturated(recording[name]))]
     if len(picks) > 1:
-        found = gap_rates(layout, values, tuple(columns), tuple(looks), picks)
+        found = gap_rates(layout, values, tuple(columns), tuple(looks), clear)
         rates = [None if rate is None else rate[:count] for rate in found]
     return gaps, slopes, np.sum(parts, axis=-1), rates
 
