@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.stats import norm
 from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import library, Policy
 from jaxcam.discrepancy.policy import Group
-from jaxcam.discrepancy.search import given_up
+from jaxcam.discrepancy.search import Clock, given_up, Search
 from jaxcam.discrepancy.terms import Motion, shapes
 from jaxcam.recordings import read_rig, References, RigError
 
@@ -197,6 +198,28 @@ def test_other_constants_need_no_other_program():
 def test_a_policy_out_of_range_is_refused(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         Policy(**wrong)
+
+
+def test_terms_far_from_the_data_leave_time_for_functions(monkeypatch, unchecked_types):
+    """Of 20 minutes, terms may take 10 while their cost is 5 per sample, and 20 while
+    it is 3; a search that is cut short says so."""
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+
+    def late(cost: float, minutes: float) -> bool:
+        now[0] = 0.0
+        clock = Clock(20.0)
+        problem = SimpleNamespace(samples=100)
+        trials = SimpleNamespace(
+            policy=Policy(), least_cost=100 * cost, problem=problem, clock=clock
+        )
+        now[0] = 60 * minutes
+        found = Search(trials)._late()
+        assert clock.stopped == found
+        return found
+
+    assert [late(5.0, at) for at in (9.9, 10.1, 20.1)] == [False, True, True]
+    assert [late(3.0, at) for at in (9.9, 10.1, 20.1)] == [False, False, True]
 
 
 def test_a_budget_bounds_the_search():

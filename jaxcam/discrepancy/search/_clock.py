@@ -22,8 +22,15 @@ class Clock:
     @property
     def over(self) -> bool:
         """Whether the time is over; a caller who asks then leaves a candidate out."""
+        return self.past(1.0)
+
+    def past(self, share: float) -> bool:
+        """Return whether a share of the time is over; a caller who asks then leaves a
+        candidate out.
+        """
         now = time.monotonic(), time.process_time()
         # several threads use more processor time than passes on the clock
-        if min(b - a for a, b in zip(self._begun, now, strict=True)) > self._allowed:
-            self.stopped = True
-        return self.stopped
+        spent = min(b - a for a, b in zip(self._begun, now, strict=True))
+        late = spent > share * self._allowed
+        self.stopped |= late
+        return late

@@ -24,6 +24,7 @@ from ..terms import (
     coordinates,
     library,
     Location,
+    moves_surface,
     system_with_terms,
     Term,
     terms_of,
@@ -116,7 +117,8 @@ def system_question(
             )
     runs = [part.recording for part in recordings]
     sensors, noisier = with_seen_noise(sensors, runs, policy)
-    pairs = location.first(coordinates(system, usual_state(system, sensors, runs)))
+    state = usual_state(system, sensors, runs)
+    pairs = location.first(coordinates(system, state))
     seen = channel_of(sensors, pairs[0][0])
     # the stated constants of a rig apply only to its first coordinate
     stated = {} if location.coordinate else stated
@@ -124,11 +126,12 @@ def system_question(
     usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))
     clocked = turned or drive is not None
+    profiled = turned and moves_surface(system, state)
 
     def listed(references: References):
         if candidates is None or isinstance(candidates, str):
             extended = candidates is not None
-            usual = library(turned, references, clocked, extended)
+            usual = library(turned, references, clocked, extended, profiled)
             offered = [location.of_library(term) for term in usual]
         else:
             offered = [location.reordered(term, len(pairs)) for term in candidates]

@@ -264,12 +264,12 @@ def library(
     references: References = References(),
     clocked: bool | None = None,
     extended: bool = False,
+    profiled: bool | None = None,
 ) -> tuple[Term, ...]:
     """Return all terms that `diagnose` tries by default.
 
     Args:
-        turned: Whether the system has a drive; without one, there are no profile
-            errors.
+        turned: Whether the system has a drive or a periodic forcing.
         references: Constants of a rig that occur in the terms (`rig.references`),
             such as the centre of a nonlinear spring or the reference speed of a
             restitution law.
@@ -280,6 +280,8 @@ def library(
             that take longer to search for: position-dependent forces with an edge,
             friction that depends on direction, speed or position, and a power law of
             restitution. The constants of these terms come from the recordings.
+        profiled: Whether the drive moves a surface, whose profile may have errors
+            (default: the value of `turned`).
 
     Returns:
         A tuple of [`jaxcam.discrepancy.Term`][].
@@ -306,9 +308,10 @@ def library(
     ]
     if not (turned if clocked is None else clocked):
         found = [term for term in found if not isinstance(term, SensorLag)]
+    if turned if profiled is None else profiled:
+        found.append(CamProfileError(lead=references.profile_lead))
     if turned:
-        lead = references.profile_lead
-        found += [CamProfileError(lead=lead), SpeedDependentBounce()]
+        found.append(SpeedDependentBounce())
     if extended:
         found += [kind() for kind in _EXTENDED]
     return tuple(found)
