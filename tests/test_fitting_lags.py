@@ -127,7 +127,9 @@ def test_recordings_of_other_intervals_are_unchanged():
 
 def test_a_lag_longer_than_a_recording_is_refused():
     run = Recording("run", 1e-3 * np.arange(9), {"height_m": np.zeros(9)})
-    with pytest.raises(RecordingError, match="a lag of 8 samples leaves fewer than two"):
+    with pytest.raises(
+        RecordingError, match="a lag of 8 samples leaves fewer than two"
+    ):
         run.earlier("height_m", 8)
 
 
