@@ -54,10 +54,11 @@ def setup_question(
     candidates: Candidates,
     report: Report,
     policy: Policy,
+    lags: Mapping[str, float],
     location: Location = Location(),
 ) -> Question:
     """Return the question of a diagnosis for an arbitrary system, given by a setup with
-    its sensors and tolerances.
+    its sensors and tolerances; `lags` (s) of channels replace those of their sensors.
 
     **Raises:** `RecordingError` if the recordings cannot be those of the rig.
     """
@@ -66,6 +67,7 @@ def setup_question(
     for run in runs:
         check_channels(run.recording if isinstance(run, Segments) else run)
     report("finding impacts and contacts", None)
+    setup, runs = setup.without_lags(runs, lags)
     model = setup.model
     return system_question(
         model.system,

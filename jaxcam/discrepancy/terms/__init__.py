@@ -49,6 +49,7 @@ from ._sensed import (
     own_faults as own_faults,
     watched as watched,
 )
+from ._sensor_terms import SensorLag as SensorLag
 from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
 from ._spelled import spelled as spelled
 from ._switched_base import (
