@@ -205,6 +205,7 @@ def test_terms_far_from_the_data_leave_time_for_functions(monkeypatch, unchecked
     it is 3; a search that is cut short says so."""
     now = [0.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
+    monkeypatch.setattr("time.process_time", lambda: now[0])
 
     def late(cost: float, minutes: float) -> bool:
         now[0] = 0.0
