@@ -12,7 +12,7 @@ from jaxcam.cli._diagnosis_figures import _maps, _unseen, draw
 from jaxcam.cli._diagnosis_page import diagnosis_page
 from jaxcam.cli._output import to_text
 from jaxcam.cli._ranking_figure import ranking, two_lines
-from jaxcam.cli._shapes_figure import caption, shapes as draw_shapes, unit_along
+from jaxcam.cli._shapes_figure import caption, shapes as draw_shapes
 from jaxcam.discrepancy import Diagnosis, Verdict
 from jaxcam.discrepancy.evidence import Structure
 from jaxcam.discrepancy.report import (
@@ -24,7 +24,7 @@ from jaxcam.discrepancy.report import (
     spelled,
 )
 from jaxcam.discrepancy.report._alternatives import _not_added
-from jaxcam.discrepancy.terms import shapes, Value, Variable
+from jaxcam.discrepancy.terms import shapes, unit_along, Value, Variable
 from jaxcam.fitting import Residuals
 
 
@@ -52,6 +52,7 @@ def _diagnosis(verdict, effects):
         0.1 * grid,
         0.1 + 0 * grid,
         quantity="force",
+        argument_unit="rad",
     )
     parts = [_residuals("run1"), _residuals("run2")]
     return Diagnosis(

@@ -8,12 +8,12 @@ import numpy as np
 
 from ..discrepancy import Diagnosis
 from ..discrepancy.report import MissingFunction
-from ..discrepancy.terms import Relaxation
+from ..discrepancy.terms import Relaxation, unit_along
 from ..fitting import Residuals
 from ._changed import changed
 from ._ranking_figure import RANKING, ranking
 from ._residual_axes import Along, residual_label, shown_in, title_of
-from ._shapes_figure import caption, shapes, unit_along
+from ._shapes_figure import caption, shapes
 
 
 matplotlib.use("Agg")

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 from ..discrepancy import Diagnosis
 from ..discrepancy.evidence import Structure
-from ..discrepancy.terms import Variable
 from ..plotting.colours import IMPACT
 from ..plotting.labels import labelled
 from ._changed import changed
@@ -20,16 +19,6 @@ class _Panel(NamedTuple):
 
     one: Structure
     textbook: Structure | None
-
-
-def unit_along(variable: str, motion: str) -> str:
-    """Return the unit of the argument of a shape, given the unit of the motion."""
-    of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
-    if variable in of_drive:
-        return of_drive[Variable(variable)]
-    if motion in ("", "-"):
-        return "-" if variable == Variable.POSITION else "1/s"
-    return motion if variable == Variable.POSITION else f"{motion}/s"
 
 
 def caption(found: Diagnosis) -> str:
@@ -54,7 +43,9 @@ def caption(found: Diagnosis) -> str:
     )
     return (
         f"{start} Each is estimated alone as a free function, with a band of twice the "
-        f"standard error (where it is wider than the line).{grey}"
+        f"standard error (where it is wider than the line).{grey} The rig parameters, "
+        "such as the stiffness, are free: a part of the curve that they can represent, "
+        "such as a constant slope, is ambiguous."
     )
 
 
@@ -77,7 +68,7 @@ def shapes(plt, found: Diagnosis):
             0.5, 0.5, "no correction can be drawn as a function", ha="center"
         )
     for axis, panel in zip(axes.flat, panels):
-        _draw(axis, panel, found.unit)
+        _draw(axis, panel)
     return figure
 
 
@@ -93,7 +84,7 @@ def _panels(found: Diagnosis) -> list[_Panel]:
     return [_Panel(one, textbook.get(one.name)) for one in kept]
 
 
-def _draw(axis, panel: _Panel, unit: str) -> None:
+def _draw(axis, panel: _Panel) -> None:
     one, before = panel
     if before is not None:
         _band(axis, before, _TEXTBOOK)
@@ -104,7 +95,7 @@ def _draw(axis, panel: _Panel, unit: str) -> None:
         _name(axis, before, one, _TEXTBOOK, "textbook\nmodel")
         _name(axis, one, before, IMPACT, "with the\nmissing\neffects")
     axis.set_title(_evidence(one), fontsize="small")
-    axis.set_xlabel(labelled(one.variable, unit_along(one.variable, unit)))
+    axis.set_xlabel(labelled(one.variable, one.argument_unit))
     axis.set_ylabel(labelled(one.quantity, one.unit.replace("^2", "²")))
 
 

@@ -1,13 +1,14 @@
 """Diagnose recordings: the verdict is "effect", "none" or "unknown"."""
 
 import dataclasses
+import math
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ..fitting import Input, Parameter, Sensor, Setup, Turning
+from ..fitting import Fit, Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from ._elsewhere import falls_short, sought_elsewhere
@@ -103,9 +104,10 @@ def diagnose(
         folder: Path | None,
         location: Location = Location(),
         lags: Mapping[str, float] = MappingProxyType({}),
+        before: Diagnosis | None = None,
     ) -> Diagnosis:
         question = rig.question(runs, location, lags, conditions)
-        return _answered(question, folder, conditions)
+        return _answered(question, folder, conditions, before)
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
@@ -119,7 +121,7 @@ def diagnose(
     if lags:
         conditions.report("repeating the diagnosis without the lag", None)
         folder = None if keep is None else keep / "without_lag"
-        again = asked(recordings, folder, lags=lags)
+        again = asked(recordings, folder, lags=lags, before=found)
         found, lags = (again, lags) if more_accurate(again, found) else (found, {})
     odd = odd_record(found.after, policy)
     if odd is not None:
@@ -195,9 +197,16 @@ class _Rig:
 
 
 def _answered(
-    question: Question, keep: Path | None, conditions: _Conditions
+    question: Question,
+    keep: Path | None,
+    conditions: _Conditions,
+    before: Diagnosis | None = None,
 ) -> Diagnosis:
-    """Search for terms, test the result, and return the diagnosis."""
+    """Search for terms, test the result, and return the diagnosis.
+
+    **Arguments:** a diagnosis `before` provides the terms and values from which the
+    search may start.
+    """
     case, seed, report, policy, _ = conditions
     ripple = None
     if question.drives:
@@ -207,7 +216,10 @@ def _answered(
         )
     trials = conditions.trials(question, keep)
     search = Search(trials)
+    known = None if before is None else _again(trials, before.names, before.after)
     best = search.run()
+    if known is not None and known.bic < best.bic:
+        best = search.refined(known)
     sharper = with_fitted_speed(question, trials, best)
     if sharper is not None:
         question = sharper
@@ -227,7 +239,8 @@ def _answered(
         return diagnosis_of(case, *rough, ripple)
     if rough is not None and rough.choice.named.best.names:
         # the physics was found, so that the stated noise can be used
-        again = _again(trials, rough.choice.named.best)
+        found = rough.choice.named.best
+        again = _again(trials, found.names, found.fit)
         if again is not None and again.bic < best.bic:
             best = search.refined(again)
     choice = choose(question, trials, best, seed, unnamed=not odd)
@@ -236,11 +249,12 @@ def _answered(
     return diagnosis_of(case, question, trials, choice, ripple)
 
 
-def _again(trials: Trials, best: Trial) -> Trial | None:
+def _again(trials: Trials, names: Collection[str], found: Fit) -> Trial | None:
     """Fit the terms of another problem, starting from their strengths there."""
-    point = trials.problem.start._replace(values=best.fit.point.values)
-    start = dataclasses.replace(best, fit=dataclasses.replace(best.fit, point=point))
-    return trials.attempt(best.names, start, trials.policy.iterations)
+    terms = frozenset(term.name for term in trials.terms if term.name in names)
+    point = trials.problem.start._replace(values=found.point.values)
+    start = Trial(terms, dataclasses.replace(found, point=point), math.inf, 0, False)
+    return trials.attempt(terms, start, trials.policy.iterations)
 
 
 class _Roughly(NamedTuple):

@@ -28,7 +28,7 @@ from ..search import (
     Response,
     separate_gain,
 )
-from ..terms import Shape, shapes, Term, terms_of, Where
+from ..terms import Shape, shapes, Term, terms_of, unit_along, Where
 from ._imitation import Beside, beside_structure
 from ._visited_states import visited_states, VisitedStates
 
@@ -90,6 +90,8 @@ class Structure:
     form: Form = Form.FUNCTION
     """An unlisted term, a free function, a vibration, or residuals that are correlated
     in time."""
+    argument_unit: str = ""
+    """Unit of `grid`."""
     quantity: str = ""
     """The quantity that `value` describes."""
     differs: bool = False
@@ -108,11 +110,14 @@ class Structure:
         """Describe the region, and where in it the shape is clearest."""
         if not len(self.grid):
             return self.region
-        score = np.abs(self.value) / np.maximum(self.stderr, _TINY)
-        k = int(np.argmax(score))
+        size = np.abs(self.value)
+        # where a curve crosses zero, its error may vanish too
+        score = np.where(size >= size.max() / 2, size, 0.0)
+        k = int(np.argmax(score / np.maximum(self.stderr, _TINY)))
         return (
-            f"{self.region}; clearest at {self.variable} {self.grid[k]:.3g}, where it "
-            f"is {self.value[k]:.2g} +- {self.stderr[k]:.1g} {self.unit}"
+            f"{self.region}; clearest at {self.variable} {self.grid[k]:.3g} "
+            f"{self.argument_unit}, where it is {self.value[k]:.2g} +- "
+            f"{self.stderr[k]:.1g} {self.unit}"
         )
 
 
@@ -250,6 +255,7 @@ def _function(
     return {
         "unit": term.written(term.unit),
         "variable": term.variable,
+        "argument_unit": unit_along(term.variable, term.motion_unit),
         "quantity": term.quantity,
         "grid": grid,
         "value": basis @ coefficients,

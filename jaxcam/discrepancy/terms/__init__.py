@@ -50,7 +50,12 @@ from ._sensed import (
     watched as watched,
 )
 from ._sensor_terms import SensorLag as SensorLag
-from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
+from ._shapes import (
+    Shape as Shape,
+    shapes as shapes,
+    unit_along as unit_along,
+    Variable as Variable,
+)
 from ._spelled import spelled as spelled
 from ._switched_base import (
     SwitchedWithHidden as SwitchedWithHidden,

@@ -34,6 +34,18 @@ class Variable(enum.StrEnum):
     TIME = "time"
 
 
+def unit_along(variable: str, motion: str) -> str:
+    """Return the unit of an argument of a free function, given the unit of the
+    motion.
+    """
+    of_drive = {Variable.PHASE: "rad", Variable.TIME: "s"}
+    if variable in of_drive:
+        return of_drive[Variable(variable)]
+    if motion in ("", "-"):
+        return "-" if variable == Variable.POSITION else "1/s"
+    return motion if variable == Variable.POSITION else f"{motion}/s"
+
+
 def _number(value):
     return jnp.asarray(value, dtype=float)
 
