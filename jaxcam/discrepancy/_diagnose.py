@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ..fitting import Fit, Input, Parameter, Sensor, Setup, Turning
+from ..fitting.engine import own_states
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from ._elsewhere import falls_short, sought_elsewhere
@@ -252,7 +253,10 @@ def _answered(
 def _again(trials: Trials, names: Collection[str], found: Fit) -> Trial | None:
     """Fit the terms of another problem, starting from their strengths there."""
     terms = frozenset(term.name for term in trials.terms if term.name in names)
-    point = trials.problem.start._replace(values=found.point.values)
+    problem = trials.problem
+    point = problem.start._replace(values=found.point.values)
+    # the states were estimated for the nominal parameters
+    point = own_states(problem.layout, problem.pieces, problem.extras, point)
     start = Trial(terms, dataclasses.replace(found, point=point), math.inf, 0, False)
     return trials.attempt(terms, start, trials.policy.iterations)
 
