@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from pendulum_records import COUNT, NOISE, records
 
 from jaxcam.discrepancy import diagnose
+from jaxcam.discrepancy._lagging import long_lag
 from jaxcam.discrepancy.report import formula_of
 from jaxcam.discrepancy.terms import (
     Family,
@@ -24,7 +26,8 @@ from jaxcam.discrepancy.terms import (
 from jaxcam.fitting import Model, Parameter, read_setup, Sensor
 from jaxcam.fitting.engine import DriveState
 from jaxcam.fitting.engine._predict import calibration, fly, samples
-from jaxcam.models import ImpactOscillator
+from jaxcam.models import BouncingBall, ImpactOscillator
+from jaxcam.recordings import Recording
 
 
 RIG = Path(__file__).parents[1] / "docs" / "rigs" / "pendulum_wall.toml"
@@ -179,3 +182,24 @@ def test_a_sensor_that_is_right_lacks_nothing():
     found = _diagnosed(_nothing)
     assert found.verdict == "none" and not found.missing
     assert found.noise_floor == pytest.approx(math.hypot(NOISE, COUNT / 12**0.5))
+
+
+def test_only_a_lag_of_two_samples_is_removed(unchecked_types):
+    """The expansion in powers of the lag is accurate up to one and a half samples."""
+    run = Recording("run", 1e-3 * np.arange(9), {"angle_rad": np.zeros(9)})
+    sensors = {"angle_rad": Sensor(0, noise=1e-3)}
+    model = Model(WithTerms(BouncingBall(), ()), sensors)
+
+    def found(lag: float | None):
+        effect = SimpleNamespace(
+            name="sensor_lag" if lag else "quadratic_drag",
+            parameters={"lag": SimpleNamespace(value=lag)},
+        )
+        problem = SimpleNamespace(model=model)
+        return SimpleNamespace(
+            effects=(effect,), after=SimpleNamespace(problem=problem)
+        )
+
+    assert long_lag(found(2.1e-3), [run]) == {"angle_rad": 2.1e-3}
+    assert long_lag(found(1.4e-3), [run]) == {}
+    assert long_lag(found(None), [run]) == {}
