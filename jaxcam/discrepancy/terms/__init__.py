@@ -42,6 +42,7 @@ from ._primitives import (
     Primitive as Primitive,
     sum_of as sum_of,
 )
+from ._products import Gate as Gate
 from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import (
     more_faults as more_faults,
