@@ -280,7 +280,7 @@ def slopes_of_function(
         if isinstance(term, FreeFunction) and term.label == one.slot
     )
     if term.gate is not None:
-        return product_slopes(term, one.numbers, points)
+        return product_slopes(term, points)
     along = jnp.linspace(term.low, term.high, points)
     direction = jnp.tanh(along / term.slip) * term.jumping
     numbers = jnp.stack(term.coefficients[: len(one.numbers)])

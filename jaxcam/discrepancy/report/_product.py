@@ -1,19 +1,50 @@
 """Products of two forms: tables, derivatives and formulas."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
+from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ...hybrid.programs import program
-from ..search import Free, free_term
-from ..terms import FreeFunction
+from ..search import Free
+from ..terms import Family, FreeFunction, GATE_PLACES, Place, Primitive, PRIMITIVES
 from ._curves import errors_of, graded
 from ._formula import formula_of
+
+
+# Step of finite differences, relative to a significant change of a parameter
+_STEP = 1e-4
+
+
+class _Factor(NamedTuple):
+    """One of the two forms, and the range of its argument."""
+
+    form: Primitive
+    low: float
+    high: float
+    slip: float
+    jumps: bool
+
+    @classmethod
+    def of(cls, family: Family, form: Primitive) -> "_Factor":
+        return cls(form, family.low, family.high, family.slip, family.jumps)
+
+    @classmethod
+    def in_term(cls, term: FreeFunction) -> "_Factor":
+        """Return the form of a function that is part of a system."""
+        form = PRIMITIVES[int(term.forms[0]) - 1]
+        ends = float(term.low), float(term.high), float(term.slip)
+        return cls(form, *ends, bool(term.jumping))
+
+    def even(self, points: int) -> Float[np.ndarray, " n"]:
+        return np.linspace(self.low, self.high, points)
+
+    def at(self, along, numbers) -> Float[np.ndarray, " n"]:
+        direction = np.tanh(along / self.slip) if self.jumps else 0.0 * along
+        place = Place.between(along, self.low, self.high)
+        value = self.form.value(place, numbers, direction)
+        return np.broadcast_to(value, along.shape)
 
 
 def product_table(
@@ -25,31 +56,33 @@ def product_table(
     **Arguments:** the product, its parameters and their covariance, and the number of
     points of each argument.
     """
-    assert one.gate is not None
-    term = free_term(one.family, one.slot, one.primitive, one.gate).exact()
-    grid = []
-    for side, family in enumerate((one.family, one.gate.family)):
-        even = np.linspace(family.low, family.high, points)
-        grid.append(
-            graded(even, lambda x, side=side: _factors(term, one, numbers, x)[side])
-        )
-    value, slopes = _with_slopes(term, *grid, one.coefficients, numbers)
+    assert one.gate is not None and one.primitive is not None
+    first = _Factor.of(one.family, one.primitive)
+    second = _Factor.of(one.gate.family, one.gate.primitive)
+    count = one.primitive.count
+    gate = np.append(1.0, numbers[count:])
+    along = graded(first.even(points), lambda x: first.at(x, numbers[:count]))
+    across = graded(second.even(points), lambda x: second.at(x, gate))
+    values = _values(first, second, along, across)
+    slopes = _slopes(values, numbers, np.abs(one.spread))
     error = errors_of(slopes.reshape(-1, len(numbers)), covariance)
-    return (grid[0], grid[1]), value, error.reshape(value.shape)
+    value = values(numbers)
+    return (along, across), value, error.reshape(value.shape)
 
 
-def product_slopes(
-    term: FreeFunction, names: Sequence[str], points: int
-) -> Float[np.ndarray, "k p"]:
+def product_slopes(term: FreeFunction, points: int) -> Float[np.ndarray, "k p"]:
     """Return the derivatives of a product with respect to its parameters, on a grid
     over both ranges with about the given number of points.
     """
-    gate, side = term.gate, math.isqrt(points)
-    assert gate is not None
-    grids = [np.linspace(float(f.low), float(f.high), side) for f in (term, gate)]
-    numbers = [term.coefficients[k] for k in _indices(names)]
-    slopes = _with_slopes(term, *grids, names, np.asarray(numbers))[1]
-    return slopes.reshape(-1, len(names))
+    assert term.gate is not None
+    first, second = _Factor.in_term(term), _Factor.in_term(term.gate)
+    side, every = math.isqrt(points), [float(x) for x in term.coefficients]
+    own = every[: first.form.count]
+    more = [every[k] for k in GATE_PLACES[: second.form.count - 1]]
+    scales = [abs(own[0]), *first.form.scales, *second.form.scales]
+    values = _values(first, second, first.even(side), second.even(side))
+    slopes = _slopes(values, np.array([*own, *more]), np.array(scales))
+    return slopes.reshape(-1, slopes.shape[-1])
 
 
 def product_of(one: Free, numbers: np.ndarray) -> tuple[str, str]:
@@ -63,46 +96,32 @@ def product_of(one: Free, numbers: np.ndarray) -> tuple[str, str]:
     (size, rest), (other, factor) = first.split("*", 1), second.split("*", 1)
     text = f"{float(size) * float(other):.4g}*{rest}*{factor}"
     acts, acts_too = (
-        one_of.split(": ", 1)[0].removeprefix("a force that ")
-        for one_of in (says, also)
+        said.split(": ", 1)[0].removeprefix("a force that ") for said in (says, also)
     )
     return text, f"a force that {acts}, times a factor that {acts_too}: {text}"
 
 
-def _indices(names: Sequence[str]) -> tuple[int, ...]:
-    return tuple(int(name.rpartition("_")[2]) for name in names)
+def _values(
+    first: _Factor, second: _Factor, along, across
+) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a product on a grid `(n, m)` as a function of its parameters."""
+    count = first.form.count
 
-
-def _placed(term: FreeFunction, names: Sequence[str], numbers) -> FreeFunction:
-    """Return a product with given parameters."""
-    every = list(term.coefficients)
-    for k, number in zip(_indices(names), numbers):
-        every[k] = jnp.asarray(number)
-    return eqx.tree_at(lambda f: f.coefficients, term, tuple(every)).prepared()
-
-
-def _factors(term: FreeFunction, one: Free, numbers, at):
-    """Return both forms of a product at the same values of their arguments."""
-    ready = _placed(term, one.coefficients, numbers)
-    return tuple(np.asarray(f.at(*_with_direction(f, at))) for f in (ready, ready.gate))
-
-
-def _with_direction(form, at):
-    return at, jnp.tanh(at / form.slip) * form.jumping
-
-
-def _with_slopes(term, along, across, names: Sequence[str], numbers):
-    """Return a product `(n, m)` and its derivatives `(n, m, p)`."""
-    return tuple(map(np.asarray, _sloped(term, along, across, tuple(names), numbers)))
-
-
-@program
-def _sloped(term, along, across, names, numbers):
     def values(numbers):
-        ready = _placed(term, names, numbers)
-        one = jax.vmap(lambda x: ready.at(*_with_direction(ready, x)))(along)
-        gate = ready.gate
-        other = jax.vmap(lambda x: gate.at(*_with_direction(gate, x)))(across)
-        return one[:, None] * other[None]
+        gate = np.append(1.0, numbers[count:])
+        one, other = first.at(along, numbers[:count]), second.at(across, gate)
+        return np.outer(one, other)
 
-    return values(numbers), jax.jacfwd(values)(numbers)
+    return values
+
+
+def _slopes(values, numbers, scales) -> Float[np.ndarray, "n m p"]:
+    """Return central differences with respect to each parameter."""
+    steps = _STEP * np.diag(scales)
+    return np.stack(
+        [
+            (values(numbers + step) - values(numbers - step)) / (2 * step[k])
+            for k, step in enumerate(steps)
+        ],
+        axis=-1,
+    )

@@ -95,13 +95,13 @@ class Products:
         values = emptied(self.problem, bare.fit.point.values, slot)
         columns = [self.problem.names.index(name) for name in one.coefficients]
         point = bare.fit.point._replace(values=replaced(values, columns, start.numbers))
-        trial = None
+        trial, most = None, self.policy.iterations
         problems = [self.problem]
         if self.apart is not self.problem:
             problems.insert(0, self.apart)
         for problem in problems:
             subset = Subset(problem, (one,), frozenset())
-            trial = self.fits.fitted(subset, point, beaten=beaten)
+            trial = self.fits.fitted(subset, point, most, beaten)
             point = trial.fit.point
             if not trial.fit.cost < beaten:
                 return None

@@ -50,33 +50,39 @@ class Shuffled(NamedTuple):
 def shuffled(
     fits: FreeFits, apart: Problem, found: Missing, policy: Policy, seed: int
 ) -> tuple[Shuffled, ...]:
-    """Return the gains of knock-offs of each force of a fit, on single flights.
+    """Return the gains of knock-offs of each force of a fit.
+
+    Forces that the recordings do not show to first order are left out.
 
     **Arguments:** `apart`: the problem with disconnected pieces; `seed` of the shifts.
     """
-    return tuple(
-        _shuffled(fits, apart, found, one, policy, seed)
-        for one in found.functions
-        if isinstance(one, Free) and one.where is Where.FLIGHT
-    )
+    compared = []
+    for one in found.functions:
+        if not isinstance(one, Free) or one.where is not Where.FLIGHT:
+            continue
+        # single pieces of flight contain little information on small forces
+        problems = (apart,) if apart is found.problem else (apart, found.problem)
+        for problem in problems:
+            shares = _shares(fits, problem, found, one, policy, seed)
+            if shares:
+                compared.append(Shuffled(one.label, one.arguments, shares))
+                break
+    return tuple(compared)
 
 
-def _shuffled(
-    fits: FreeFits, apart: Problem, found: Missing, one: Free, policy: Policy, seed: int
-) -> Shuffled:
-    """Return the gains of knock-offs of one force, with the others in place."""
+def _shares(
+    fits: FreeFits, problem: Problem, found: Missing, one: Free, policy: Policy, seed
+) -> tuple[float, ...]:
+    """Return the gains of knock-offs of one force, with the others in place, as
+    fractions of its own; none if its own is not positive.
+    """
     heat, point = heat_of(found.fit), found.fit.point
     others = [other for other in found.functions if other.slot != one.slot]
-    problem = heated(filled(apart, others), heat)
-    point = Point(emptied(apart, point.values, one.slot), point.states)
+    problem = heated(filled(problem, others), heat)
+    point = Point(emptied(problem, point.values, one.slot), point.states)
     response = force_response(problem, point, fits.rig)
     nodes = Nodes.of(problem, response, heat)
-    forces = forces_at_nodes(problem, response, [free_term(one.family, "new")])
-    if one.gate is not None:
-        own = [found.fit[name].value for name in one.coefficients]
-        numbers = np.array([1.0, *own[one.primitive.count :]])  # pyright: ignore
-        gate = form_at_nodes(nodes, one.gate.family, one.gate.primitive, numbers)
-        forces = forces * gate[..., None]
+    forces = _functions(nodes, found, one)
 
     def gain(forces) -> float:
         zero = np.zeros(forces.shape[-1])
@@ -84,12 +90,27 @@ def _shuffled(
         return max(roughness(*quadratic, one.family, zero, policy).gain, 0.0)
 
     whole = gain(forces)
+    if not whole > 0:
+        return ()
     rng = np.random.default_rng(seed)
-    shares = [
-        gain(_at_other_moments(response, forces, rng)) / whole if whole > 0 else 1.0
-        for _ in range(policy.knock_offs)
-    ]
-    return Shuffled(one.label, one.arguments, tuple(sorted(shares, reverse=True)))
+    knock_offs = (
+        _at_other_moments(response, forces, rng) for _ in range(policy.knock_offs)
+    )
+    return tuple(sorted((gain(each) / whole for each in knock_offs), reverse=True))
+
+
+def _functions(nodes: Nodes, found: Missing, one: Free) -> Float[np.ndarray, "r k l p"]:
+    """Return the functions of which a force consists at the nodes of all pieces; those
+    of a product have its second form as a factor.
+    """
+    term = free_term(one.family, "new")
+    forces = forces_at_nodes(nodes.problem, nodes.response, [term])
+    if one.gate is None or one.primitive is None:
+        return forces
+    own = [found.fit[name].value for name in one.coefficients]
+    numbers = np.array([1.0, *own[one.primitive.count :]])
+    gate = form_at_nodes(nodes, one.gate.family, one.gate.primitive, numbers)
+    return forces * gate[..., None]
 
 
 def _at_other_moments(

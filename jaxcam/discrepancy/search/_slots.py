@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array
 
 from ...fitting import Model, Problem
+from ...fitting.engine import parameter_places
 from ..terms import (
     Family,
     FREE,
@@ -248,6 +249,11 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
                 for p in problem.parameters
             ),
         )
+        if one.gate is not None:
+            # a second form adds leaves to the model
+            places = parameter_places(problem.layout.model, problem.parameters)
+            layout = dataclasses.replace(problem.layout, places=places)
+            problem = dataclasses.replace(problem, layout=layout)
     return problem
 
 

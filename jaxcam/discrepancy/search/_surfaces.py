@@ -23,8 +23,9 @@ from ._roughness import beside, Roughness, roughness
 # Number of sines of each argument, and of harmonics with their constant; one more
 # coefficient represents a jump
 _SINES, _HARMONICS = 10, 9
-# Number of coefficients of every surface, so that all share one compiled program
-_WIDTH = (_SINES + 1) ** 2
+# Number of coefficients of every surface, so that all share one compiled program; the
+# last one has no effect
+_WIDTH = (_SINES + 1) ** 2 + 1
 # Arguments that may be combined
 _COMBINED = (
     (Variable.VELOCITY, Variable.POSITION),

@@ -16,8 +16,8 @@ from jaxtyping import Array, Bool, Float
 from ...fitting import Parameter
 from ._families import Factor, Family
 from ._free_splines import BEYOND, interpolated, knots_of, splines
-from ._primitives import MOST_NUMBERS, MOST_PARTS, Primitive, PRIMITIVES
-from ._products import Gate
+from ._primitives import MOST_PARTS, Primitive, PRIMITIVES
+from ._products import Gate, GATE_PLACES
 from ._shapes import Variable
 from ._term import Motion, Term, terms_of
 from ._where import Where
@@ -77,7 +77,8 @@ class FreeFunction(Term):
     forms: Float[Array, " m"] = eqx.field(default=(0.0,) * MOST_PARTS, converter=_array)
     odd: Float[Array, ""] = eqx.field(default=0.0, converter=_array)
     stride: Float[Array, ""] | None = None
-    gate: "FreeFunction | None" = None
+    # absent in saved systems without products
+    gate: "FreeFunction | None" = eqx.field(default=None, metadata={"spare": True})
     table: Float[Array, " n"] | None = None
     softened: Float[Array, " n"] | None = None
     jump: Float[Array, ""] | None = None
@@ -113,7 +114,7 @@ class FreeFunction(Term):
         if self.gate is None:
             return None
         count = len(self.coefficients)
-        own = (jnp.ones(()), *self.coefficients[MOST_NUMBERS : 2 * MOST_NUMBERS - 1])
+        own = (jnp.ones(()), *(self.coefficients[k] for k in GATE_PLACES))
         own += (jnp.zeros(()),) * (count - len(own))
         return eqx.tree_at(lambda f: f.coefficients, self.gate, own).prepared()
 

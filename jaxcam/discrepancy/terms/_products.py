@@ -6,6 +6,13 @@ from ._families import Family
 from ._primitives import MOST_NUMBERS, Primitive
 
 
+GATE_PLACES = tuple(range(MOST_NUMBERS, 2 * MOST_NUMBERS - 1))
+"""Indices of the parameters of a second form among the coefficients of a function.
+
+They follow the largest number of parameters that the first form can have.
+"""
+
+
 class Gate(NamedTuple):
     """The second form of a product, and the family whose argument it has.
 
@@ -17,8 +24,5 @@ class Gate(NamedTuple):
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Return the indices of its parameters among the coefficients of a function.
-
-        They follow the largest number of parameters that the first form can have.
-        """
-        return tuple(range(MOST_NUMBERS, MOST_NUMBERS + self.primitive.count - 1))
+        """Return the indices of its parameters among the coefficients of a function."""
+        return GATE_PLACES[: self.primitive.count - 1]
