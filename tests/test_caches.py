@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 import jaxcam
@@ -81,3 +82,36 @@ class Broken(HybridSystem):
 def test_a_mistake_in_a_system_is_not_hidden():
     with pytest.raises((TypeError, ValueError), match="shape"):
         jaxcam.simulate(Broken(), [1.0, 0.0], 0.0, 0.5)
+
+
+class Loaded(HybridSystem):
+    """A ball whose acceleration is kept in an object that can be changed in place."""
+
+    load: list | np.ndarray
+
+    def vector_field(self, t, x):
+        return jnp.stack([x[1], -jnp.asarray(self.load)[0]])
+
+    def gap(self, t, x):
+        return x[0]
+
+    def impact(self, t, x):
+        return jnp.stack([x[0], -x[1]])
+
+
+@pytest.mark.parametrize("kind", [list, np.array])
+def test_a_parameter_changed_in_place_is_seen_by_the_next_run(kind):
+    # height after 0.1 s of free fall from 1 m, exact to 1e-12
+    ball = Loaded(kind([9.81]))
+    for load in (9.81, 2.0):
+        ball.load[0] = load
+        run = jaxcam.simulate(ball, [1.0, 0.0], 0.0, 0.1)
+        assert float(run.final[0]) == pytest.approx(1 - load / 200, abs=1e-12)
+
+
+def test_a_parameter_changed_in_place_is_checked_again():
+    ball = Loaded([9.81])
+    jaxcam.simulate(ball, [1.0, 0.0], 0.0, 0.1)
+    ball.load[0] = float("nan")
+    with pytest.raises(ValueError, match="not finite"):
+        jaxcam.simulate(ball, [1.0, 0.0], 0.0, 0.1)

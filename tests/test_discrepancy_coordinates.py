@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 import jaxcam
-from jaxcam.discrepancy import library, strength, Term
-from jaxcam.discrepancy.terms import coordinates, WithTerms
+from jaxcam.discrepancy import library, Policy, strength, Term
+from jaxcam.discrepancy.search import system_question
+from jaxcam.discrepancy.terms import coordinates, moves_surface, WithTerms
+from jaxcam.fitting import Parameter, Sensor
 from jaxcam.hybrid import HybridSystem
+from jaxcam.models import BouncingBall, CamFollower, ImpactOscillator
+from jaxcam.recordings import Recording, segment
 
 
 RATIO, RESTITUTION = 0.7, 0.6
@@ -192,3 +196,32 @@ def test_units_are_those_of_the_coordinate():
     in_metres = eqx.tree_at(lambda t: t.fc, friction, jnp.asarray(0.0))
     assert in_metres.strengths()[0].unit == "rad/s^2"
     assert type(friction)(motion_unit="m").strengths()[0].unit == "m/s^2"
+
+
+def test_a_profile_error_requires_a_surface_that_the_drive_moves():
+    """The wall of an oscillator with a periodic force is fixed; the cam and the
+    vibrating floor move, the latter even with the amplitude zero of its default."""
+    assert not moves_surface(ImpactOscillator(), np.zeros(2))
+    assert moves_surface(CamFollower(), np.zeros(2))
+    assert moves_surface(BouncingBall(amplitude=0.0), np.zeros(2))
+    fixed = {term.name for term in library(profiled=False)}
+    assert {term.name for term in library()} - fixed == {"cam_profile_error"}
+
+
+@pytest.mark.slow
+def test_a_forced_rig_with_a_fixed_wall_is_not_offered_a_profile_error():
+    """The list of a question contains no profile error for a fixed wall, and one for a
+    vibrating floor; both contain the sensor lag, whose time origin the forcing
+    fixes."""
+    time, rng, channel = 0.02 * np.arange(200), np.random.default_rng(0), "height_m"
+    motions = 5.0 + np.sin(time) + 1e-3 * rng.normal(size=(2, 200))
+    runs = [Recording(f"run{k}", time, {channel: x}) for k, x in enumerate(motions)]
+    runs = [segment(run, channel) for run in runs]
+    sensors = {channel: Sensor(0, noise=1e-3)}
+    bounce = Parameter("restitution", lambda m: m.system.restitution, 0.1)
+    for system, moves in ((ImpactOscillator(wall=10.0), False), (BouncingBall(), True)):
+        every = system, runs, None, sensors, (bounce,), None
+        question = system_question(*every, lambda said, part: None, Policy())
+        names = {term.name for term in question.terms}
+        assert ("cam_profile_error" in names) is moves
+        assert "sensor_lag" in names and question.turned

@@ -84,3 +84,19 @@ def test_a_limit_of_time_is_noticed_only_if_a_candidate_is_left_out():
     assert not long.over and not long.stopped
     assert not short.stopped
     assert short.over and short.stopped
+
+
+def test_the_time_of_other_programs_does_not_count(monkeypatch):
+    """A search of one minute that has had 30 s of the processor in 2 min goes on."""
+    wall, used = [0.0], [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: wall[0])
+    monkeypatch.setattr("time.process_time", lambda: used[0])
+    clock = Clock(1.0)
+    wall[0], used[0] = 120.0, 30.0
+    assert not clock.over
+    # two threads
+    wall[0], used[0] = 120.0, 61.0
+    assert clock.over
+    clock = Clock(1.0)
+    wall[0], used[0] = 150.0, 121.0
+    assert not clock.over

@@ -2,7 +2,9 @@
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
+import jax
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -10,7 +12,7 @@ from scipy.stats import norm
 from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import library, Policy
 from jaxcam.discrepancy.policy import Group
-from jaxcam.discrepancy.search import given_up
+from jaxcam.discrepancy.search import Clock, given_up, Search
 from jaxcam.discrepancy.terms import Motion, shapes
 from jaxcam.recordings import read_rig, References, RigError
 
@@ -182,6 +184,15 @@ def test_what_can_be_derived_is():
     assert policy.small == pytest.approx(0.04, rel=1e-15)
 
 
+def test_other_constants_need_no_other_program():
+    """Compiled programs are kept by the structure of their arguments, so the next
+    recordings of a rig, with other speeds, use those of the first.
+    """
+    other = References(*(2 * x for x in dataclasses.astuple(References())))
+    for one, two in zip(library(), library(references=other), strict=True):
+        assert jax.tree.structure(one) == jax.tree.structure(two), one.name
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -196,6 +207,29 @@ def test_what_can_be_derived_is():
 def test_a_policy_out_of_range_is_refused(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         Policy(**wrong)
+
+
+def test_terms_far_from_the_data_leave_time_for_functions(monkeypatch, unchecked_types):
+    """Of 20 minutes, terms may take 10 while their cost is 5 per sample, and 20 while
+    it is 3; a search that is cut short says so."""
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    monkeypatch.setattr("time.process_time", lambda: now[0])
+
+    def late(cost: float, minutes: float) -> bool:
+        now[0] = 0.0
+        clock = Clock(20.0)
+        problem = SimpleNamespace(samples=100)
+        trials = SimpleNamespace(
+            policy=Policy(), least_cost=100 * cost, problem=problem, clock=clock
+        )
+        now[0] = 60 * minutes
+        found = Search(trials)._late()
+        assert clock.stopped == found
+        return found
+
+    assert [late(5.0, at) for at in (9.9, 10.1, 20.1)] == [False, True, True]
+    assert [late(3.0, at) for at in (9.9, 10.1, 20.1)] == [False, False, True]
 
 
 def test_a_budget_bounds_the_search():

@@ -218,3 +218,16 @@ def test_no_part_holds_out_sections_at_a_fixed_distance(rooms):
         rounds = parts[: 3 * (count // 3)].reshape(-1, 3)
         assert len(rounds) > 2
         assert any(tuple(one) != tuple(rounds[0]) for one in rounds)
+
+
+def test_numbers_and_arrays_need_the_same_program(rooms):
+    """A model made of Python numbers has the same types as one made of arrays."""
+    room = Room(gravity=9.7, drag=0.12, restitution=0.75)
+    weak = eqx.tree_at(lambda m: m.gravity, room, jnp.asarray(9.7))
+    assert weak.gravity.weak_type
+    kinds = []
+    for one in (room, weak):
+        problem = Problem.build(Model(one, SENSORS), rooms.segments, PARAMETERS)
+        kinds.append([leaf.aval for leaf in jax.tree.leaves(problem.layout)])
+    assert kinds[0] == kinds[1]
+    assert not any(aval.weak_type for aval in kinds[0])

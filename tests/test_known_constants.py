@@ -140,7 +140,7 @@ def test_a_diagnosis_knows_it_too(tmp_path):
     """The terms that could be missing are fitted beside the same constants."""
     setup = setup_of(tmp_path)
     question = setup_question(
-        setup, recorded(), None, lambda words, share: None, Policy()
+        setup, recorded(), None, lambda words, share: None, Policy(), {}
     )
     assert question.rig == ("stiffness", "damping", "force")
     problem = question.problem

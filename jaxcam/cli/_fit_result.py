@@ -145,6 +145,7 @@ def fitted(
         report("finding impacts and contacts", share)
 
     if isinstance(nominal, fitting.Setup):
+        nominal, runs = nominal.without_lags(runs)
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
             raise ValueError(

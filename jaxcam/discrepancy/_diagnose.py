@@ -4,12 +4,14 @@ import dataclasses
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from ._elsewhere import falls_short, sought_elsewhere
+from ._lagging import long_lag, more_accurate
 from ._mappings import make_room
 from ._set_aside import odd_record, set_aside
 from .evidence import Choice, choose, ripple_of, whole_flights
@@ -100,23 +102,31 @@ def diagnose(
         runs: Sequence[Recording | Segments],
         folder: Path | None,
         location: Location = Location(),
+        lags: Mapping[str, float] = MappingProxyType({}),
     ) -> Diagnosis:
-        question = rig.question(runs, location, conditions)
+        question = rig.question(runs, location, lags, conditions)
         return _answered(question, folder, conditions)
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
         conditions.report(f"searching at {kind} {location[k] + 1}", None)
         name = "at_{}_{}".format(*location)
-        return asked(recordings, None if keep is None else keep / name, location)
+        folder = None if keep is None else keep / name
+        return asked(recordings, folder, location, lags)
 
     found = asked(recordings, keep)
+    lags = long_lag(found, recordings)
+    if lags:
+        conditions.report("repeating the diagnosis without the lag", None)
+        folder = None if keep is None else keep / "without_lag"
+        again = asked(recordings, folder, lags=lags)
+        found, lags = (again, lags) if more_accurate(again, found) else (found, {})
     odd = odd_record(found.after, policy)
     if odd is not None:
         conditions.report(f"repeating the diagnosis without {odd}", None)
         others = [run for run in recordings if _name_of(run) != odd]
         folder = None if keep is None else keep / "without_one"
-        found = set_aside(found, asked(others, folder), odd)
+        found = set_aside(found, asked(others, folder, lags=lags), odd)
     elif falls_short(found):
         found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
     if keep is not None and not conditions.clock.stopped:
@@ -160,14 +170,18 @@ class _Rig:
         self,
         recordings: Sequence[Recording | Segments],
         location: Location,
+        lags: Mapping[str, float],
         conditions: _Conditions,
     ) -> Question:
-        """Return the question to be answered from recordings."""
+        """Return the question to be answered from recordings; `lags` (s) of channels
+        replace those of their sensors.
+        """
         system, asked = self.system, (conditions.report, conditions.policy)
+        offered = recordings, self.candidates
         if isinstance(system, Rig):
-            return rig_question(system, recordings, self.candidates, *asked)
+            return rig_question(system, *offered, *asked, lags)
         if isinstance(system, Setup):
-            return setup_question(system, recordings, self.candidates, *asked, location)
+            return setup_question(system, *offered, *asked, lags, location)
         return system_question(
             system,
             tuple(recordings),  # pyright: ignore

@@ -159,7 +159,11 @@ class Policy:
 
     # settings that limit the search
     minutes: float = bounds(
-        20.0, "time of a search (min) after which no further candidate is tried"
+        20.0, "time (min, without other programs) after which no candidate is tried"
+    )
+    named_time: float = bounds(
+        0.5,
+        "fraction of this time for named terms while the fits are far from the data",
     )
     quick_iterations: int = bounds(
         15, "maximum iterations in the first fit of a subset"
@@ -168,9 +172,7 @@ class Policy:
     heldout_iterations: int = bounds(
         15, "maximum iterations in a fit to part of the recordings"
     )
-    state_iterations: int = bounds(
-        12, "maximum Newton steps when only states are fitted"
-    )
+    state_iterations: int = bounds(12, "maximum Newton steps if only states are fitted")
     state_gain: float = bounds(
         1e-3, "reduction of the cost below which these Newton steps end"
     )
@@ -267,9 +269,7 @@ class Policy:
     cause_worse: float = bounds(
         4.0, "multiple of the smallest misfit above which this series ends"
     )
-    cause_difference: float = bounds(
-        1e-3, "relative step of the finite differences in that fit"
-    )
+    cause_difference: float = bounds(1e-3, "relative step of its finite differences")
     cause_fits: int = bounds(40, "maximum number of evaluations in that fit")
     trace_stride: float = bounds(
         0.1, "step in the trace of the monodromy matrix along a branch"
@@ -355,6 +355,5 @@ class Policy:
     def settings(self) -> Iterator[Setting]:
         """Yield every setting with its group and meaning, in order."""
         for field in dataclasses.fields(self):
-            about = field.metadata
-            value = getattr(self, field.name)
+            about, value = field.metadata, getattr(self, field.name)
             yield Setting(field.name, value, about["group"], about["says"])

@@ -13,6 +13,7 @@ from ._fit_result import Fit as Fit
 from ._free_run import free_run as free_run, FreeRun as FreeRun
 from ._identify import Identifiability as Identifiability, identify as identify
 from ._impact_law import impact_law as impact_law, ImpactLaw as ImpactLaw
+from ._lags import without_lags as without_lags
 from ._profile import excess_cost as excess_cost, profile as profile
 from ._read_setup import is_setup as is_setup, read_setup as read_setup
 from ._residuals import Residuals as Residuals, residuals as residuals

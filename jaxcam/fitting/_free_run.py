@@ -247,7 +247,8 @@ def simulated(model: Model, one: Prepared) -> Simulated:
                 value, slope = x[place], field[place]
             else:
                 value, slope = jax.jvp(sensor.seen, (x[:size],), (field[:size],))
-            values.append(sensor.offset + sensor.gain * (value - sensor.lag * slope))
+            lag = sensor.lag - sensor.removed_lag
+            values.append(sensor.offset + sensor.gain * (value - lag * slope))
         gap = jnp.min(gaps(system, t, x[:size]), initial=jnp.inf)
         return Simulated(jnp.stack(values), gap, jnp.asarray(events, dtype=int))
 

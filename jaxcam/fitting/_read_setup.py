@@ -1,9 +1,7 @@
 """Read the rig file of a user's system."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from ..hybrid import HybridSystem
 from ..parameters import parameter_names
@@ -11,17 +9,15 @@ from ..recordings import RigError
 from ..recordings.files import (
     known_keys,
     LAYOUT_KEYS,
-    printable,
     read_layout,
     read_references,
     read_tables,
     Section,
-    shown_value,
-    si,
-    unit_of,
 )
+from ._read_channels import channel_of, read_sensors
 from ._setup import Setup
-from .engine import Input, Model, Parameter, Sensor, Turning
+from ._stated import NUMBER, Stated, stated
+from .engine import Input, Model, Turning
 from .own_systems import Field, stated_system, system_class
 
 
@@ -35,18 +31,6 @@ _TABLES = (
     "records",
     *LAYOUT_KEYS,
 )
-# Keys that one entry of `[parameters]` may have
-_NUMBER = ("value", "tolerance", "lower", "upper", "unit")
-
-
-class _Stated(NamedTuple):
-    """One entry of `[parameters]`; a value without a tolerance is held fixed."""
-
-    value: float | bool | str
-    tolerance: float = 0.0
-    lower: float = -math.inf
-    upper: float = math.inf
-    unit: str = ""
 
 
 def read_setup(
@@ -81,8 +65,8 @@ def read_setup(
     tables = read_tables(file)
     known_keys(file, "", tables, _TABLES)
     cls = _class(file, tables, system)
-    stated = dict(_parameters(file, tables))
-    fitted = {name: one for name, one in stated.items() if one.tolerance > 0}
+    given = dict(_parameters(file, tables))
+    fitted = {name: one for name, one in given.items() if one.tolerance > 0}
     drive, drive_channel, measured = _drive(file, tables)
     for name in measured:
         if name in fitted and name != _phase_of(drive):
@@ -93,13 +77,15 @@ def read_setup(
     made = stated_system(
         file,
         cls,
-        {name: one.value for name, one in stated.items()},
+        {name: one.value for name, one in given.items()},
         fitted=fitted,
         measured=measured,
     )
+    sensors, calibrated = read_sensors(file, tables, made)
+    own = (one.parameter(n, Field(f"system.{n}")) for n, one in fitted.items())
     return Setup(
-        Model(made, _sensors(file, tables, made), drive),
-        tuple(_parameter(name, one) for name, one in fitted.items()),
+        Model(made, sensors, drive),
+        (*own, *calibrated),
         drive_channel,
         read_references(file, tables, None),
         _records(file, tables, made, {*fitted, *measured}),
@@ -142,7 +128,7 @@ def _class(file: Path, tables, system) -> type[HybridSystem]:
     return system_class(named, file.parent)
 
 
-def _parameters(file: Path, tables) -> Iterator[tuple[str, _Stated]]:
+def _parameters(file: Path, tables) -> Iterator[tuple[str, Stated]]:
     """Read the entries of `[parameters]`; fields of a part of the system have dotted
     names.
     """
@@ -154,57 +140,17 @@ def _parameters(file: Path, tables) -> Iterator[tuple[str, _Stated]]:
         if name in seen:
             raise section.error(name, "is given twice")
         seen.add(name)
-        yield name, _stated(inner, key)
+        yield name, stated(inner, key)
 
 
 def _flat(section: Section, before: str) -> Iterator[tuple[str, Section, str]]:
     for key, entry in section.table.items():
         name = f"{before}{key}"
-        if isinstance(entry, dict) and entry and set(entry).isdisjoint(_NUMBER):
+        if isinstance(entry, dict) and entry and set(entry).isdisjoint(NUMBER):
             inner = Section(section.file, key, section.table, section.name)
             yield from _flat(inner, f"{name}.")
         else:
             yield name, section, key
-
-
-def _stated(section: Section, key: str) -> _Stated:
-    entry = section.table[key]
-    if isinstance(entry, bool | str):
-        return _Stated(entry)
-    if not isinstance(entry, dict):
-        return _Stated(section.as_number(key, entry))
-    known_keys(section.file, f"{section.name}.{printable(key)}", entry, _NUMBER)
-    if "value" not in entry:
-        raise section.error(key, "has no `value`")
-    value = section.as_number(key, entry["value"])
-    lower, upper = (
-        section.as_number(key, entry[which]) if which in entry else otherwise
-        for which, otherwise in (("lower", -math.inf), ("upper", math.inf))
-    )
-    if not lower <= value <= upper or lower == upper:
-        raise section.error(
-            key, f"is {value:g}, and must be between {lower:g} and {upper:g}"
-        )
-    tolerance = entry.get("tolerance", 0.0)
-    if tolerance != math.inf:
-        tolerance = section.as_number(key, tolerance)
-    if tolerance < 0:
-        raise section.error(key, f"has the negative tolerance {tolerance:g}")
-    unit = entry.get("unit", "")
-    if not isinstance(unit, str):
-        raise section.error(key, f"has the unit {shown_value(unit)}, which is not text")
-    return _Stated(value, float(tolerance), lower, upper, unit)
-
-
-def _parameter(name: str, one: _Stated) -> Parameter:
-    return Parameter(
-        name,
-        Field(f"system.{name}"),
-        one.tolerance,
-        lower=one.lower,
-        upper=one.upper,
-        unit=one.unit,
-    )
 
 
 def _records(
@@ -262,7 +208,7 @@ def _drive(
         )
     if "drive" in tables:
         section = Section(file, "drive", tables)
-        channel = _channel(section, section.word("channel"))
+        channel = channel_of(section, section.word("channel"))
         speed, phase = (
             section.word(key) if key in section.table else key
             for key in ("speed", "phase")
@@ -277,46 +223,8 @@ def _drive(
         return drive, channel, measured
     if "input" in tables:
         section = Section(file, "input", tables)
-        channel = _channel(section, section.word("channel"))
+        channel = channel_of(section, section.word("channel"))
         field = section.word("field")
         section.done()
         return Input(channel, Field(field)), None, {field: 0.0}
     return None, None, {}
-
-
-def _sensors(file: Path, tables, system: HybridSystem) -> dict[str, Sensor]:
-    """Create a sensor for each table of `[channels]`."""
-    outer = Section(file, "channels", tables)
-    if not outer.table:
-        raise RigError(
-            f"{file}: [channels] is empty; add a table for each measured channel, "
-            f"such as [channels.position_m]."
-        )
-    return {_channel(outer, name): _sensor(outer, name, system) for name in outer.table}
-
-
-def _sensor(outer: Section, name: str, system: HybridSystem) -> Sensor:
-    if not isinstance(outer.table[name], dict):
-        raise outer.error(name, "is not a table with `sees` and `noise`")
-    section = Section(outer.file, name, outer.table, outer.name)
-    seen = section.choice("sees", *system.state_names)
-    unit = unit_of(name) or None
-    noise = section.positive("noise", unit)
-    units = {"resolution": unit, "limit": unit, "bandwidth_hz": "Hz", "tails": ""}
-    options = {
-        key: section.positive(key, units[key]) for key in units if key in section.table
-    }
-    known_keys(section.file, section.name, section.table, ("sees", "noise", *units))
-    place = system.state_names.index(seen)
-    return Sensor(place, noise, **options)  # pyright: ignore
-
-
-def _channel(section: Section, name: str) -> str:
-    """Check the name of a channel, which is read in SI units."""
-    renamed, factor = si(name)
-    if renamed != name or factor != 1.0:
-        raise section.error(
-            name,
-            f"is read in SI units; call it `{renamed}` and give its noise in SI units",
-        )
-    return name

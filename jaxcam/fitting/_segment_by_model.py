@@ -12,7 +12,15 @@ from jaxtyping import Float
 from ..hybrid.programs import program
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
-from ..recordings.cut import Drive, padded, read_drive, segment_gaps, Segments
+from ..recordings.cut import (
+    Drive,
+    padded,
+    read_drive,
+    saturated,
+    segment_gaps,
+    Segments,
+)
+from ._gap_rates import gap_rates
 from ._missed_impacts import Spans, with_missed_impacts
 from .engine import (
     DriveState,
@@ -41,7 +49,9 @@ def segment_by_model(
 
     A gap is computed from the measured components of the state and shifted so that it
     is zero where its velocity jumps, as far as the tolerances of the parameters allow.
-    If the system has no gap, each recording is one flight.
+    If channels that do not saturate also measure the velocities that the rate of change
+    of a gap depends on, impacts are jumps of this rate, and contacts are stretches in
+    which it is zero. If the system has no gap, each recording is one flight.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts
@@ -104,12 +114,13 @@ def segment_by_model(
 
 
 class _ShownGaps(NamedTuple):
-    """The gaps that can be computed from the channels, `(g, k)`, and their errors
-    `(g,)`.
+    """The gaps that can be computed from the channels, `(g, k)`, their errors `(g,)`,
+    and for each its rate of change `(k,)` if that can be computed too.
     """
 
     gaps: Float[np.ndarray, "g k"]
     errors: Float[np.ndarray, " g"]
+    rates: list[Float[np.ndarray, " k"] | None]
     drive: Drive | None
 
 
@@ -117,11 +128,14 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
     drive = None if drive_channel is None else read_drive(recording, drive_channel)
     states = _states(model, picks, recording)
     here = with_constants(model, recording)
-    gaps, slopes, errors = _gaps(here, parameters, recording, states, drive)
+    gaps, slopes, errors, rates = _gaps(
+        here, parameters, recording, states, drive, picks
+    )
     shown = np.any(slopes != 0, axis=-1)
     if np.any(shown):
         _refuse_unseen(model, picks, recording, slopes)
-    return _ShownGaps(gaps[shown], errors[shown], drive)
+    rates = [rate for rate, one in zip(rates, shown) if one]
+    return _ShownGaps(gaps[shown], errors[shown], rates, drive)
 
 
 def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
@@ -142,6 +156,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
         drive=shown.drive,
         restitution=restitution,
         doubted=doubted,
+        rates=shown.rates,
     )
 
 
@@ -156,9 +171,10 @@ def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
     return states
 
 
-def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
+def _gaps(model: Model, parameters, recording, states, drive: Drive | None, picks):
     """Return the gaps `(g, k)`, the largest magnitudes of their derivatives with
-    respect to the state `(g, n)`, and their errors `(g,)`.
+    respect to the state `(g, n)`, their errors `(g,)`, and for each its measured rate
+    of change `(k,)` or `None`.
     """
     layout = Layout(model, parameter_places(model, parameters))
     values = np.array([float(p.where(model)) for p in parameters])
@@ -179,7 +195,12 @@ def _gaps(model: Model, parameters, recording, states, drive: Drive | None):
     # a parameter that does not affect a gap and has no tolerance must not give zero
     # times infinity
     parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
-    return gaps, slopes, np.sum(parts, axis=-1)
+    rates: list = [None] * len(gaps)
+    clear = [k for k, name in picks.items() if not np.any(saturated(recording[name]))]
+    if len(picks) > 1:
+        found = gap_rates(layout, values, tuple(columns), tuple(looks), clear)
+        rates = [None if rate is None else rate[:count] for rate in found]
+    return gaps, slopes, np.sum(parts, axis=-1), rates
 
 
 @program

@@ -5,12 +5,14 @@ import fnmatch
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
 from ..recordings import read_case, Recording, RecordingError, Segments
 from ..recordings.files import Case, FileLayout
+from ._lags import without_lags
 from ._segment_by_model import segment_by_model
 from .engine import Input, Model, Parameter, Problem
 
@@ -153,13 +155,37 @@ class Setup:
                     "check that its sensor is connected, or remove this recording."
                 )
 
+    def without_lags(
+        self,
+        recordings: Iterable[Recording | Segments],
+        lags: Mapping[str, float] = MappingProxyType({}),
+    ) -> tuple["Setup", tuple[Recording | Segments, ...]]:
+        """Return the setup and the recordings after `jaxcam.fitting.without_lags`;
+        both are unchanged if a recording is already segmented.
+
+        Args:
+            recordings: The recordings.
+            lags: Lags of channels (s) that replace those of their sensors.
+
+        Raises:
+            RecordingError: A recording is too short, or a channel is missing.
+        """
+        runs = tuple(recordings)
+        whole = [run for run in runs if isinstance(run, Recording)]
+        if len(whole) < len(runs):
+            return self, runs
+        model, moved = without_lags(self.model, whole, lags)
+        return dataclasses.replace(self, model=model), moved
+
     def problem(self, recordings: Iterable[Recording | Segments]) -> Problem:
-        """Return the fitting problem of recordings, segmented or not.
+        """Return the fitting problem of recordings, segmented or not, without the long
+        lags of the sensors.
 
         Raises:
             ValueError: As for `segments` and `Problem.build`.
         """
-        return Problem.build(self.model, self.segments(recordings), self.parameters)
+        setup, runs = self.without_lags(recordings)
+        return Problem.build(setup.model, setup.segments(runs), self.parameters)
 
 
 def _fits(name: str, pattern: str) -> bool:

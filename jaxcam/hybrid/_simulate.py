@@ -9,13 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
-from ..parameters import as_arrays, FloatScalar, real_array, VectorLike
+from ..parameters import FloatScalar, real_array, VectorLike
+from ._converted import Converted
 from ._prepared import prepared
 from ._settings import Settings
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from ._types import RealScalar
 from ._untraced import prepare, run_untraced
+from .caches import Latest
 from .checks import check_arguments, check_gaps
 from .codes import BEHIND, NOT_FINITE, PAINLEVE, RUNNING
 from .loop import Log, LoopState, run, run_reversible
@@ -33,6 +35,12 @@ from .record import (
 from .runge_kutta import tableau_of
 from .segments import simulate_segments
 from .surface import release_point
+
+
+# the same system and settings are often passed to many runs
+_SYSTEM, _SETTINGS = Converted(), Converted()
+# the settings whose solver has been found usable
+_USABLE = Latest()
 
 
 def _check_choices(engine: str, derivatives: str) -> None:
@@ -102,8 +110,7 @@ def simulate(
     settings = _chosen(settings, tolerance, solver, max_step)
     _check_choices(engine, derivatives)
     t0, t1 = jnp.asarray(t0, dtype=jnp.float64), jnp.asarray(t1, dtype=jnp.float64)
-    system = as_arrays(system)
-    settings = as_arrays(settings)
+    system, settings = _SYSTEM.of(system), _SETTINGS.of(settings)
     traced = is_traced((system, state, t0, t1, settings))
     if state is None:
         state, t_start = _released(system, t0, traced)
@@ -116,7 +123,9 @@ def simulate(
             system, settings, t_start, state, t1, max_steps, progress, traced
         )
         return _trajectory(system, settings, t0, t1, parts, code)
-    tableau_of(settings.solver)
+    if _USABLE.get(settings) is None:
+        tableau_of(settings.solver)
+        _USABLE.keep(settings, True)
     if traced or derivatives == "reverse":
         rows = 4096 if max_steps is None else max_steps
         # a scan is differentiated in reverse mode step by step, a loop only as a whole
@@ -248,11 +257,10 @@ def _assemble(system, t0, state, mode, log: Log, compiles: bool = False) -> Part
     """Return the parts of a trajectory from the log of a run that is not traced."""
     t0, state, mode, log = jax.tree.map(np.asarray, (t0, state, mode, log))
     system = prepared(system)
-    log = Log(*(part[log.kind > 0] for part in log))
-    rows, width = log.mode.shape
-    # contacts that exist at the start do not belong to any row of the log
-    sizes = rows, width * (rows + 1)
-    return assemble(system, t0, state, mode, log, sizes, np, compiles=compiles)
+    taken = log.kind > 0
+    if not taken.all():
+        log = Log(*(part[taken] for part in log))
+    return assemble(system, t0, state, mode, log, None, np, compiles=compiles)
 
 
 @jax.jit

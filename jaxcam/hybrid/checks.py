@@ -16,6 +16,7 @@ from ._settings import Settings
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
 from .backend import Rowwise
+from .caches import Latest
 from .loop import starts_behind
 from .programs import is_traced
 from .surface import check_restitution, restitutions
@@ -68,7 +69,9 @@ def check_start(system: HybridSystem, settings: Settings, t0, state, t1) -> None
 
 def check_arguments(system: HybridSystem, settings: Settings, t0, state, t1) -> None:
     """Raise `ValueError` for an invalid system, settings, times or state."""
-    settings.check()
+    if _CHECKED.get(settings) is None:
+        settings.check()
+        _CHECKED.keep(settings, True)
     if state.ndim != 1:
         raise ValueError(
             f"state has shape {state.shape}; pass one vector, and use jax.vmap for many"
@@ -116,19 +119,26 @@ _STARTS_BEHIND = Rowwise(lambda case, _: starts_behind(*case), width=1)
 _RESTITUTIONS = Rowwise(lambda case, _: restitutions(*case), width=1)
 
 
+# the settings that were checked last
+_CHECKED = Latest()
 # keys of systems that have passed the checks: of shapes alone, and of all numbers. Such
 # systems are not checked again, because a check takes as long as a short run
 _WELL_SHAPED: set = set()
 _SOUND: set = set()
 _MANY = 1000
+# the number of components of the state with which the same system was checked last
+_LATEST = Latest()
 
 
 def check_system(system, t0, state, settings: Settings) -> None:
     """Raise `ValueError` for an invalid parameter or function of the system."""
+    if _LATEST.get(system) == len(state):
+        return
     structure = structure_of(system)
     signature = None if structure is None else (structure, state.shape)
     numbers = signature, digest_of(system)
     if signature is not None and numbers in _SOUND:
+        _LATEST.keep(system, len(state))
         return
     for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)):
         if not np.all(np.isfinite(leaf)):

@@ -30,6 +30,11 @@ def is_tracing() -> bool:
     return isinstance(jax.lax.stop_gradient(0.0), Tracer)
 
 
+def is_outermost() -> bool:
+    """Return whether no transformation of JAX is active, not even `vmap` or `jvp`."""
+    return trace_state_clean()
+
+
 def program(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a function when it is first called, as `equinox.filter_jit` does.
 
@@ -49,6 +54,6 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
-        return (outermost if trace_state_clean() else inner)(*args, **kwargs)
+        return (outermost if is_outermost() else inner)(*args, **kwargs)
 
     return call

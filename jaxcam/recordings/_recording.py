@@ -88,6 +88,40 @@ class Recording:
             self, time=self.time[keep], channels=channels, filled=filled
         )
 
+    def earlier(self, channel: str, samples: int) -> "Recording":
+        """Return the recording with the samples of one channel moved to earlier times.
+
+        Args:
+            channel: The channel, such as that of a sensor with a lag.
+            samples: Number of intervals by which the samples are moved, not negative.
+                The recording becomes shorter by as many samples.
+
+        Raises:
+            RecordingError: The channel is missing, or fewer than two samples remain.
+
+        Examples:
+            >>> from jaxcam.recordings import Recording
+            >>> times, heights = np.arange(4.0), np.array([0.0, 0.0, 1.0, 2.0])
+            >>> run = Recording("run", times, {"height_m": heights})
+            >>> run.earlier("height_m", 1)["height_m"].tolist()
+            [0.0, 1.0, 2.0]
+        """
+        moved, count = self[channel], len(self) - samples
+        if count < 2:
+            raise RecordingError(
+                f"{self.name}: a lag of {samples} samples leaves fewer than two of "
+                f"{len(self)}; check the lag."
+            )
+        channels = {name: one[:count] for name, one in self.channels.items()}
+        channels[channel] = moved[samples:]
+        filled = self.filled
+        if filled is not None:
+            # a sample is complete only if all its parts are
+            filled = filled[:count] | filled[samples:]
+        return dataclasses.replace(
+            self, time=self.time[:count], channels=channels, filled=filled
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class Case:

@@ -4,6 +4,7 @@ from ._choice import Choice as Choice, choose as choose
 from ._differing import above_noise as above_noise, Differing as Differing
 from ._held_out import HeldOut as HeldOut, rms_of as rms_of
 from ._limits import Limit as Limit, limits as limits
+from ._not_shared import not_shared as not_shared
 from ._redrawn import Needs as Needs
 from ._ripple import Ripple as Ripple, ripple_of as ripple_of
 from ._rivals import Rival as Rival

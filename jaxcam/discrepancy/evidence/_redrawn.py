@@ -109,11 +109,11 @@ def needs(
     rows = {name: blocks.rows(parameters) for name, parameters in own.items()}
 
     def lost(weight) -> tuple[np.ndarray, dict[str, float]]:
-        information, score = blocks.total(weight)
-        step, _ = newton_step(information, score, free)
-        top = gain(information, score, free)
+        quadratic = blocks.total(weight)
+        step, _ = newton_step(*quadratic, free)
+        top = gain(*quadratic, free)
         return step, {
-            name: _lost(information, score, value, free, gone, top) - prices[name]
+            name: lost_without(*quadratic, value, free, gone, top) - prices[name]
             for name, gone in rows.items()
         }
 
@@ -144,7 +144,7 @@ def _inside(found: Fit) -> list[str]:
     return kept
 
 
-def _lost(information, score, value, free, gone, top: float) -> float:
+def lost_without(information, score, value, free, gone, top: float) -> float:
     """Return the increase in the cost when some strengths are zero and all other
     parameters are refitted.
     """

@@ -5,7 +5,7 @@ occur.
 import dataclasses
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -26,8 +26,10 @@ from ..search import (
     Periodogram,
     predicted_gain,
     Response,
+    separate_gain,
 )
 from ..terms import Shape, shapes, Term, terms_of, Where
+from ._imitation import Beside, beside_structure
 from ._visited_states import visited_states, VisitedStates
 
 
@@ -90,6 +92,12 @@ class Structure:
     in time."""
     quantity: str = ""
     """The quantity that `value` describes."""
+    differs: bool = False
+    """Whether it certainly differs from recording to recording: with a value of its own
+    in each recording, it explains significantly more."""
+    named: Mapping[str, Beside] = dataclasses.field(default_factory=dict)
+    """Far from the data, for each named term, what is lost without it: as the fit is,
+    and if the structure is fitted as well."""
 
     @property
     def significant(self) -> bool:
@@ -117,13 +125,15 @@ def structures(
     references: References,
     unit: str,
     policy: Policy,
+    parts: Mapping[str, Sequence[str]],
 ) -> list[Structure]:
     """Test the residuals of a fit for structures, and return them with the largest
     excess first.
 
     **Arguments:** the fit, the response to a force about it, terms that only describe
     an unknown effect, the periodogram of the residuals, whether there is a drive, the
-    constants of the shapes, the unit of the motion, and the policy.
+    constants of the shapes, the unit of the motion, the policy, and the parameters of
+    each named term.
     """
     problem, seen = found.problem, visited_states(found.problem)
     more: tuple[Term, ...] = (
@@ -140,6 +150,7 @@ def structures(
     others = [t for t in more if not any(t is force for force in forces)]
     wide = extended(problem, others, found.point)
     tests = len(more) + 2
+    chance, heat = policy.false_alarms / tests, max(1.0, found.cost / problem.samples)
     made = []
     for terms, blocks, place in (
         (forces, force_blocks(problem, response, forces), 0),
@@ -154,9 +165,15 @@ def structures(
             )
             threshold = _threshold(len(own), problem.samples, tests, policy)
             shape = _shape(term, blocks, information, score, free, own, seen, policy)
-            predicted = math.inf
+            predicted, differs = math.inf, False
             if grown > threshold:
                 predicted = predicted_gain(blocks, free, own, policy)
+            if predicted <= 0:
+                more_gain, number = separate_gain(blocks, free, own, policy)
+                differs = more_gain > heat * chi2.isf(chance, max(number, 1))
+            named = {}
+            if grown > threshold and predicted > 0 and heat > policy.near_cost:
+                named = beside_structure(found, blocks, free, own, parts)
             made.append(
                 Structure(
                     term.name,
@@ -168,6 +185,8 @@ def structures(
                     len(own),
                     **shape,
                     predicted_gain=predicted,
+                    differs=bool(differs),
+                    named=named,
                     form=Form.FUNCTION if isinstance(term, Shape) else Form.TERM,
                 )
             )
@@ -257,6 +276,7 @@ def _vibration(
         _threshold(count, problem.samples, tests, policy, scan.cells),
         count,
         predicted_gain=seen,
+        differs=seen <= 0,
         form=Form.VIBRATION,
     )
 

@@ -4,6 +4,7 @@ import dataclasses
 from typing import NamedTuple
 
 from ...fitting import Fit
+from ..policy import Policy
 from ..search import Question, Trial, Trials, within_tolerances
 from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
 from ._held_out import held_out, HeldOut
@@ -34,6 +35,8 @@ class Supported:
         that retain them; `needed`: those that are named nevertheless.
     - `masked`: terms that were dropped because they may only compensate for the
         smoothed corner of another term, with their fractions of the explained cost.
+    - `imitating`: terms that were dropped because they only imitate an effect that
+        remains, with the sentence of this effect.
     - `beyond`: rig parameters that are outside their tolerances.
     - `left_before`, `left_after`: structures in the residuals of the textbook model,
         and of the named terms.
@@ -47,6 +50,7 @@ class Supported:
     doubtful: list[tuple[str, float]]
     needed: list[tuple[str, float]]
     masked: list[tuple[str, float]]
+    imitating: list[tuple[str, str]]
     beyond: list[Outside]
     left_before: list[Structure]
     left_after: list[Structure]
@@ -100,6 +104,13 @@ def supported(question: Question, trials: Trials, found: Trial, seed: int) -> Su
                 best, left_after, held = found, with_all, whole
                 needed, doubtful = doubtful, []
                 inclusion, deviation = redrawn(trials, best, seed)
+    imitating: list[tuple[str, str]] = []
+    while (wrong := _imitating(left_after, trials.policy)) is not None:
+        imitating.append(wrong)
+        best = trials.without(best, wrong[0])
+        inclusion, deviation = redrawn(trials, best, seed)
+        left_after = _left(question, trials, best) if best.names else left_before
+        held, needed = None, []
     beyond, best = _instead(trials, best, deviation)
     inclusion |= {one.term: one.parameter.chance for one in beyond if one.term}
     return Supported(
@@ -110,6 +121,7 @@ def supported(question: Question, trials: Trials, found: Trial, seed: int) -> Su
         doubtful=doubtful,
         needed=needed,
         masked=masked,
+        imitating=imitating,
         beyond=beyond,
         left_before=left_before,
         left_after=left_after,
@@ -142,7 +154,25 @@ def bounded(trials: Trials, less: Fit, best: Fit) -> Fit:
     return within_tolerances(less, best, trials.rig, trials.policy)
 
 
+def _imitating(left: list[Structure], policy: Policy) -> tuple[str, str] | None:
+    """Return the named term that imitates a remaining structure most, if any, and the
+    sentence of this structure.
+    """
+    found = [
+        (each.beside / each.alone, name, one.sentence)
+        for one in left
+        if one.significant
+        for name, each in one.named.items()
+        if each.imitates(one.gain, policy)
+    ]
+    return min(found)[1:] if found else None
+
+
 def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:
+    parts = {
+        name: [one.name for one in trials.term(name).strengths()]
+        for name in sorted(trial.names)
+    }
     return structures(
         trial.fit,
         trials.response(trial.names),
@@ -152,4 +182,5 @@ def _left(question: Question, trials: Trials, trial: Trial) -> list[Structure]:
         question.references,
         question.unit,
         trials.policy,
+        parts,
     )

@@ -96,7 +96,8 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
     blocks = trials.blocks(best)
     information, score = blocks.total()
     free = blocks.rows(trials.parameters(best.names))
-    dropped = dict((*choice.named.doubtful, *choice.named.masked))
+    uncertain = choice.named.doubtful, choice.named.masked, choice.named.imitating
+    dropped = {name for each in uncertain for name, _ in each}
     for term in trials.terms:
         if term.name in best.names:
             continue

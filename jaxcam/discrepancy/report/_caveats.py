@@ -4,7 +4,16 @@ import dataclasses
 import enum
 from collections.abc import Iterator
 
-from ..evidence import Choice, Differing, HeldOut, Outside, Rejected, Rival, rms_of
+from ..evidence import (
+    Choice,
+    Differing,
+    HeldOut,
+    not_shared,
+    Outside,
+    Rejected,
+    Rival,
+    rms_of,
+)
 from ..policy import Policy
 from ..search import Question, Shuffled, Trial, Trials
 from ._words import listed, number, percent, quantity, ratio, spelled
@@ -16,6 +25,7 @@ class Reason(enum.StrEnum):
     SMALL_REMAINDER = "small remainder"
     IN_DOUBT = "in doubt"
     MASKED = "masked by a corner"
+    IMITATING = "imitates what is missing"
     NAMED_IN_DOUBT = "named in doubt"
     FAR_FROM_DATA = "far from the data"
     TIE = "tie"
@@ -61,6 +71,8 @@ def caveats_of(
         yield _in_doubt(trials, name, share)
     for name, share in choice.named.masked:
         yield _masked(choice, name, share)
+    for name, sentence in choice.named.imitating:
+        yield _imitating(name, sentence)
     for name, share in choice.named.needed:
         yield _named_in_doubt(trials, name, share)
     for outside in choice.named.beyond:
@@ -69,13 +81,8 @@ def caveats_of(
         yield _far(trials)
     for trial in ties:
         yield _tie(choice.named.best, trial)
-    apart = [
-        s
-        for s in choice.named.left_after
-        if s.gain > s.threshold and s.predicted_gain <= 0
-    ]
-    explained = choice.differing is not None and choice.differing.complete
-    if apart and not explained:
+    apart = not_shared(choice, trials.policy)
+    if apart and not (choice.differing is not None and choice.differing.complete):
         yield Caveat(
             Reason.NOT_SHARED,
             "A discrepancy that differs from recording to recording remains "
@@ -84,9 +91,8 @@ def caveats_of(
         )
     if choice.differing is not None:
         yield differs(choice.differing, trials.policy)
-    held = choice.held
-    if held.after > trials.policy.as_noise:
-        yield above_noise(held, named)
+    if choice.held.after > trials.policy.as_noise:
+        yield above_noise(choice.held, named)
 
 
 def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:
@@ -309,6 +315,15 @@ def _masked(choice: Choice, name: str, share: float) -> Caveat:
         f"A term for {spelled(name)} would explain only {share:.1g} of the misfit "
         f"explained by {listed(sorted(choice.named.best.names))}; the smoothing of dry "
         "friction at zero velocity may leave this much unexplained.",
+        (name,),
+    )
+
+
+def _imitating(name: str, sentence: str) -> Caveat:
+    return Caveat(
+        Reason.IMITATING,
+        f"A term for {spelled(name)} improves the fit, but it would hardly be needed "
+        f"in addition to the remaining effect, which acts like {sentence}.",
         (name,),
     )
 

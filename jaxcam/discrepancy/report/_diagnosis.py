@@ -214,8 +214,11 @@ class Diagnosis:
         return tuple(effect.name for effect in self.effects)
 
     def model(self, record: int | str = 0) -> Model:
-        """Return the model with the missing effects, for use in other functions."""
-        model = self.after.model(record)
+        """Return the model with the missing effects, for use in other functions.
+
+        Its sensors have their total lags, as recordings as they are do.
+        """
+        model = _whole_lags(self.after.model(record))
         if not isinstance(model.system, WithTerms):
             return model
         exact = tuple(term.exact() for term in model.system.terms)
@@ -291,3 +294,12 @@ class Diagnosis:
             and dict(zip(("coordinate", "gap"), self.location)),
             "summary": self.summary,
         }
+
+
+def _whole_lags(model: Model) -> Model:
+    """Return a model of recordings whose samples have not been moved."""
+    sensors = {
+        name: dataclasses.replace(one, removed_lag=0.0)
+        for name, one in model.sensors.items()
+    }
+    return dataclasses.replace(model, sensors=sensors)

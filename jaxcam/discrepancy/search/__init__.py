@@ -14,6 +14,7 @@ from ._gains import (
     gain as gain,
     newton_step as newton_step,
     predicted_gain as predicted_gain,
+    separate_gain as separate_gain,
 )
 from ._given_up import given_up as given_up
 from ._hidden_state import Hidden as Hidden

@@ -54,16 +54,7 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
     names = list(dict.fromkeys(blocks.record))
     if len(names) < 2:
         return np.inf
-    information, score = blocks.total()
-    free = free[np.diag(information)[free] > 0]
-    new = np.setdiff1d(new, free)
-    rest, _ = _beside(information, score, free, new, np.eye(len(new)))
-    own = np.diag(information)[new]
-    scale = 1 / np.sqrt(np.where(own > 0, own, np.inf))
-    values, vectors = np.linalg.eigh(rest * np.outer(scale, scale))
-    seen = values > policy.distinct_information
-    # combinations distinguishable from the free parameters, each with unit information
-    basis = scale[:, None] * vectors[:, seen] / np.sqrt(values[seen])
+    free, new, basis = _distinguished(blocks, free, new, policy)
     total = 0.0
     for half in (names[::2], names[1::2]):
         known = np.isin(blocks.record, half).astype(float)
@@ -74,6 +65,55 @@ def predicted_gain(blocks: Blocks, free, new, policy: Policy) -> float:
         inside, pull = _beside(*blocks.total(1 - known), free, new, basis)
         total += float(2 * step @ pull - step @ inside @ step)
     return total
+
+
+def separate_gain(blocks: Blocks, free, new, policy: Policy) -> tuple[float, int]:
+    """Return the increase in twice the log-likelihood when each recording has its own
+    values of the `new` parameters instead of common ones, and the number of additional
+    parameters.
+
+    If the values are common, the increase has a chi-squared distribution with this
+    number of degrees of freedom. Combinations about which a recording contains too
+    little information have no separate value there.
+    """
+    free, new, basis = _distinguished(blocks, free, new, policy)
+    names = list(dict.fromkeys(blocks.record))
+    each = [np.flatnonzero(np.array(blocks.record) == name) for name in names]
+
+    def freed(groups) -> tuple[float, int]:
+        """Free the parameters in each group of blocks, with the others common."""
+        information, score = blocks.total()
+        inside, slope = information[np.ix_(free, free)], score[free]
+        total, count = 0.0, 0
+        for group in groups:
+            own = np.sum(blocks.information[group], axis=0)
+            values, vectors = np.linalg.eigh(basis.T @ own[np.ix_(new, new)] @ basis)
+            told = values > policy.half_information
+            root = vectors[:, told] / np.sqrt(values[told])
+            across = root.T @ basis.T @ own[np.ix_(new, free)]
+            along = root.T @ basis.T @ np.sum(blocks.score[group], axis=0)[new]
+            inside, slope = inside - across.T @ across, slope - across.T @ along
+            total, count = total + float(along @ along), count + int(np.sum(told))
+        return total + float(slope @ invert_information(inside) @ slope), count
+
+    common, few = freed([np.arange(len(blocks.record))])
+    separate, many = freed(each)
+    return separate - common, many - few
+
+
+def _distinguished(blocks: Blocks, free, new, policy: Policy):
+    """Return the free and the new parameters, and the combinations of the new ones that
+    can be distinguished from the free ones, each with unit information.
+    """
+    information, score = blocks.total()
+    free = free[np.diag(information)[free] > 0]
+    new = np.setdiff1d(new, free)
+    rest, _ = _beside(information, score, free, new, np.eye(len(new)))
+    own = np.diag(information)[new]
+    scale = 1 / np.sqrt(np.where(own > 0, own, np.inf))
+    values, vectors = np.linalg.eigh(rest * np.outer(scale, scale))
+    seen = values > policy.distinct_information
+    return free, new, scale[:, None] * vectors[:, seen] / np.sqrt(values[seen])
 
 
 def _beside(information, score, free, new, basis):

@@ -1,10 +1,16 @@
 """The problem of a cam-follower rig."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...fitting import cam_follower_model, cam_follower_parameters, Model, Problem
+from ...fitting import (
+    cam_follower_model,
+    cam_follower_parameters,
+    Model,
+    Problem,
+    without_lags,
+)
 from ...recordings import Recording, RecordingError, Rig, segment_case
 from ...recordings.cut import Segments
 from ...recordings.files import check_channels, check_drive
@@ -34,9 +40,10 @@ def rig_question(
     candidates: Candidates,
     report: Report,
     policy: Policy,
+    lags: Mapping[str, float],
 ) -> Question:
     """Return the problem of a cam-follower rig; the rig contains sensors and
-    tolerances.
+    tolerances, and `lags` (s) are those of its channels, if known.
 
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
     """
@@ -44,13 +51,14 @@ def rig_question(
     refuse_one(runs)
     _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
     report("finding impacts and contacts", None)
+    base = cam_follower_model(rig)
     cut = [run for run in runs if isinstance(run, Segments)]
     if len(cut) < len(runs):
-        cut = list(segment_case(runs, rig))  # pyright: ignore
+        base, whole = without_lags(base, runs, lags)  # pyright: ignore
+        cut = list(segment_case(whole, rig))
     if candidates is None or isinstance(candidates, str):
         extended = candidates is not None
         candidates = library(references=rig.references, extended=extended)
-    base = cam_follower_model(rig)
     own = [part.recording for part in cut]
     sensors, noisier = with_seen_noise(base.sensors, own, policy)
     slip = rig.references.slip_speed

@@ -33,7 +33,7 @@ class Search:
             most = len(self.trials.terms) if size == 1 else self.policy.fitted_subsets
             order = sorted(promised, key=lambda n: promised[n][0])[:most]
             for k, names in enumerate(order):
-                if self.trials.clock.over:
+                if self._late():
                     break
                 said = " and ".join(spelled(name) for name in sorted(names))
                 self.trials.progress(f"fitting {said}", k / len(order))
@@ -81,6 +81,16 @@ class Search:
         """
         part = best.fit.cost / before.fit.cost
         return self.trials.settled(best) or part < self.policy.helpful_cost
+
+    def _late(self) -> bool:
+        """Return whether to try no further subset.
+
+        Far from the data, time is left for unnamed functions, because the terms may not
+        contain the missing effect.
+        """
+        near = self.policy.near_cost * self.trials.problem.samples
+        far = self.trials.least_cost > near
+        return self.trials.clock.past(self.policy.named_time if far else 1.0)
 
     def _settles(self, start: Trial, trial: Trial | None) -> bool:
         """Return whether a subset explains the data although the smaller one did not.

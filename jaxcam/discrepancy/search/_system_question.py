@@ -24,6 +24,7 @@ from ..terms import (
     coordinates,
     library,
     Location,
+    moves_surface,
     system_with_terms,
     Term,
     terms_of,
@@ -53,10 +54,11 @@ def setup_question(
     candidates: Candidates,
     report: Report,
     policy: Policy,
+    lags: Mapping[str, float],
     location: Location = Location(),
 ) -> Question:
     """Return the question of a diagnosis for an arbitrary system, given by a setup with
-    its sensors and tolerances.
+    its sensors and tolerances; `lags` (s) of channels replace those of their sensors.
 
     **Raises:** `RecordingError` if the recordings cannot be those of the rig.
     """
@@ -65,6 +67,7 @@ def setup_question(
     for run in runs:
         check_channels(run.recording if isinstance(run, Segments) else run)
     report("finding impacts and contacts", None)
+    setup, runs = setup.without_lags(runs, lags)
     model = setup.model
     return system_question(
         model.system,
@@ -116,7 +119,8 @@ def system_question(
             )
     runs = [part.recording for part in recordings]
     sensors, noisier = with_seen_noise(sensors, runs, policy)
-    pairs = location.first(coordinates(system, usual_state(system, sensors, runs)))
+    state = usual_state(system, sensors, runs)
+    pairs = location.first(coordinates(system, state))
     seen = channel_of(sensors, pairs[0][0])
     # the stated constants of a rig apply only to its first coordinate
     stated = {} if location.coordinate else stated
@@ -124,11 +128,12 @@ def system_question(
     usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))
     clocked = turned or drive is not None
+    profiled = turned and moves_surface(system, state)
 
     def listed(references: References):
         if candidates is None or isinstance(candidates, str):
             extended = candidates is not None
-            usual = library(turned, references, clocked, extended)
+            usual = library(turned, references, clocked, extended, profiled)
             offered = [location.of_library(term) for term in usual]
         else:
             offered = [location.reordered(term, len(pairs)) for term in candidates]

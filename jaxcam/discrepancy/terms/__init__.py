@@ -36,6 +36,7 @@ from ._location import (
     other_locations as other_locations,
 )
 from ._motion_scales import MotionScales as MotionScales
+from ._moving_surface import moves_surface as moves_surface
 from ._primitives import (
     MOST_PARTS as MOST_PARTS,
     Place as Place,
@@ -50,6 +51,7 @@ from ._sensed import (
     own_faults as own_faults,
     watched as watched,
 )
+from ._sensor_terms import SensorLag as SensorLag
 from ._shapes import Shape as Shape, shapes as shapes, Variable as Variable
 from ._spelled import spelled as spelled
 from ._switched_base import (

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
 from ...recordings import References
@@ -27,16 +26,11 @@ from ._springs import (
     StopBelow,
 )
 from ._switched_base import SwitchedWithHidden, SwitchedWithTerms
-from ._term import Motion, strength, Term
+from ._term import constant, Motion, strength, Term
 from ._value import Value
 from ._where import Where
 from ._with_hidden import WithHidden
 from ._with_terms import WithTerms
-
-
-def _reference(default: float):
-    """Declare a constant of a term: it is not fitted, and a saved file may omit it."""
-    return eqx.field(default=default, static=True, metadata={"spare": True})
 
 
 # In units of the dry friction: the largest applied force that is balanced exactly, the
@@ -74,7 +68,7 @@ class CoulombFriction(Term):
     )
     corner: ClassVar[bool] = True
     fc: float = strength("[q]/s^2", 0.1, lower=0.0)
-    slip: float = _reference(References.slip_speed)
+    slip: float = constant(References.slip_speed)
 
     def acceleration(self, motion: Motion):
         share = _share_of(motion.pushed, self.fc)
@@ -114,7 +108,7 @@ class NonlinearSpring(Term):
     region: ClassVar[str] = "in flight, at large deflections"
     source: ClassVar[str] = "Duffing 1918; Kovacic and Brennan 2011, chapter 2"
     k3: float = strength("1/(s^2 [q]^2)", 100.0)
-    center: float = _reference(References.spring_center)
+    center: float = constant(References.spring_center)
 
     def acceleration(self, motion: Motion):
         return -self.k3 * (motion.position - self.center) ** 3
@@ -129,7 +123,7 @@ class CamProfileError(Term):
     region: ClassVar[str] = "at impacts and in contact, as a function of drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"
     run: float = strength("[q]", 1e-4)
-    lead: float = _reference(References.profile_lead)
+    lead: float = constant(References.profile_lead)
 
     def contact(self, motion: Motion):
         return self.run * jnp.cos(2 * motion.phase + self.lead)
@@ -193,8 +187,8 @@ class StribeckFriction(Term):
     listed: ClassVar[bool] = False
     corner: ClassVar[bool] = True
     fs: float = strength("[q]/s^2", 0.1, lower=0.0)
-    speed: float = _reference(References.stribeck_speed)
-    slip: float = _reference(References.slip_speed)
+    speed: float = constant(References.stribeck_speed)
+    slip: float = constant(References.slip_speed)
 
     def acceleration(self, motion: Motion):
         slow = jnp.exp(-((motion.velocity / self.speed) ** 2))
@@ -211,7 +205,7 @@ class AsymmetricFriction(Term):
     listed: ClassVar[bool] = False
     corner: ClassVar[bool] = True
     fa: float = strength("[q]/s^2", 0.1, lower=0.0)
-    slip: float = _reference(References.slip_speed)
+    slip: float = constant(References.slip_speed)
 
     def acceleration(self, motion: Motion):
         return -self.fa * (1 + jnp.tanh(motion.velocity / self.slip)) / 2
@@ -270,12 +264,12 @@ def library(
     references: References = References(),
     clocked: bool | None = None,
     extended: bool = False,
+    profiled: bool | None = None,
 ) -> tuple[Term, ...]:
     """Return all terms that `diagnose` tries by default.
 
     Args:
-        turned: Whether the system has a drive; without one, there are no profile
-            errors.
+        turned: Whether the system has a drive or a periodic forcing.
         references: Constants of a rig that occur in the terms (`rig.references`),
             such as the centre of a nonlinear spring or the reference speed of a
             restitution law.
@@ -286,6 +280,8 @@ def library(
             that take longer to search for: position-dependent forces with an edge,
             friction that depends on direction, speed or position, and a power law of
             restitution. The constants of these terms come from the recordings.
+        profiled: Whether the drive moves a surface, whose profile may have errors
+            (default: the value of `turned`).
 
     Returns:
         A tuple of [`jaxcam.discrepancy.Term`][].
@@ -312,9 +308,10 @@ def library(
     ]
     if not (turned if clocked is None else clocked):
         found = [term for term in found if not isinstance(term, SensorLag)]
+    if turned if profiled is None else profiled:
+        found.append(CamProfileError(lead=references.profile_lead))
     if turned:
-        lead = references.profile_lead
-        found += [CamProfileError(lead=lead), SpeedDependentBounce()]
+        found.append(SpeedDependentBounce())
     if extended:
         found += [kind() for kind in _EXTENDED]
     return tuple(found)

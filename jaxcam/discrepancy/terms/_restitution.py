@@ -1,22 +1,17 @@
 """Coefficients of restitution that depend on the approach speed."""
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
 from ...recordings import References
 from ._scaled import ScaledTerm
-from ._term import Motion, strength, Term
+from ._term import constant, Motion, strength, Term
 from ._where import Where
 
 
 # Lower limit of the approach speed, as a fraction of the highest speed
 _SLOWEST = 1e-3
-
-
-def _array(value) -> Any:
-    return jnp.asarray(value, dtype=float)
 
 
 class RestitutionVelocity(Term):
@@ -33,10 +28,7 @@ class RestitutionVelocity(Term):
     source: ClassVar[str] = "Goldsmith, Impact, 1960, chapter 8; Johnson 1985, 11.5"
     reference_speed: ClassVar[str] = "impact_speed"
     rb: float = strength("-", 0.02, lower=0.0)
-    # an array, so that fits with another speed need no other program
-    reference: float = eqx.field(
-        default=References.impact_speed, converter=_array, metadata={"spare": True}
-    )
+    reference: float = constant(References.impact_speed)
 
     def described(self) -> str:
         speed = f"{float(self.reference):.4g} {self.written('[q]/s')}"

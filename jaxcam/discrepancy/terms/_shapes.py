@@ -15,7 +15,7 @@ from jaxtyping import Array
 
 from ...fitting import Parameter
 from ...recordings import References
-from ._term import Motion, Term, terms_of
+from ._term import constant, Motion, Term, terms_of
 from ._where import Where
 
 
@@ -164,7 +164,7 @@ class FrictionOfAngle(Polynomial):
     variable: ClassVar[Variable] = Variable.POSITION
     count: ClassVar[int] = 3
 
-    slip: float = eqx.field(default=References.free_slip_speed, static=True)
+    slip: float = constant(References.free_slip_speed)
 
     def acceleration(self, motion: Motion):
         return -self.value(motion.position) * jnp.tanh(motion.velocity / self.slip)

@@ -102,6 +102,18 @@ def strength(
     )
 
 
+def constant(default: float):
+    """Declare a constant of a term: it is not fitted, and a saved file may omit it.
+
+    The constant is an array, so that fits with other values need no other program.
+    """
+    return eqx.field(
+        default=default,
+        converter=lambda value: jnp.asarray(value, dtype=float),
+        metadata=_SPARE,
+    )
+
+
 @dataclasses.dataclass(frozen=True)
 class Strength:
     """One fitted parameter of a term, as declared by `strength`."""

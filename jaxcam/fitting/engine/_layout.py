@@ -1,7 +1,7 @@
 """A model as a function of the values of its parameters."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -12,8 +12,26 @@ from ...hybrid.programs import program
 from ._model import Model
 
 
+T = TypeVar("T")
+
+
 def _as_it_is(model: Model) -> Model:
     return model
+
+
+def strongly_typed(tree: T) -> T:
+    """Return a tree whose arrays have no weak types.
+
+    Arrays made of Python numbers are weakly typed, and JAX compiles a program of its
+    own for them.
+    """
+
+    def one(leaf):
+        if not getattr(leaf, "weak_type", False):
+            return leaf
+        return jax.lax.convert_element_type(leaf, leaf.dtype)
+
+    return jax.tree.map(one, tree)
 
 
 class Layout(eqx.Module):

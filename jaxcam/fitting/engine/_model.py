@@ -54,7 +54,11 @@ class Sensor(eqx.Module):
     offset: Float[Array, ""] = _number(0.0)
     """Offset, in the units of the channel."""
     lag: Float[Array, ""] = _number(0.0)
-    """Lag (s); it must be short compared with the time scale of the motion."""
+    """Lag (s). It must be short compared with the time scale of the motion, apart from
+    the part that has been removed from the recordings: see `removed_lag`."""
+    removed_lag: Float[Array, ""] = _number(0.0)
+    """Part of the lag (s) that the recordings no longer contain, because the samples of
+    the channel have been moved."""
     error: Callable | None = eqx.field(default=None, static=True)
     """Systematic error added to the sensor reading in a fit: a function `error(system,
     t, value, slope)`, where `slope` is the rate of change of `value`; default: none.

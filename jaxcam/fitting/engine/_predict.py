@@ -184,7 +184,7 @@ def _least(slopes, residual):
 
 
 class Calibration(NamedTuple):
-    """Offset, gain and lag of each sensor, `(c,)` each."""
+    """Offset, gain and remaining lag of each sensor, `(c,)` each."""
 
     offset: Float[Array, " c"]
     gain: Float[Array, " c"]
@@ -193,9 +193,8 @@ class Calibration(NamedTuple):
 
 def calibration(model: Model) -> Calibration:
     """Return the calibration of a model's sensors."""
-    sensors = model.sensors.values()
-    parts = ([getattr(s, name) for s in sensors] for name in Calibration._fields)
-    return Calibration(*map(jnp.stack, parts))
+    rows = [(s.offset, s.gain, s.lag - s.removed_lag) for s in model.sensors.values()]
+    return Calibration(*map(jnp.stack, zip(*rows)))
 
 
 def samples(

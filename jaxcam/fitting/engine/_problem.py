@@ -57,7 +57,7 @@ from jaxtyping import ArrayLike, Float
 
 from ...recordings import RecordingError, Segments
 from ._known_constants import known_constants
-from ._layout import Layout
+from ._layout import Layout, strongly_typed
 from ._linear import Extras
 from ._linearise import Point
 from ._model import Input, Model
@@ -129,6 +129,10 @@ class Problem:
     """Nominal parameters, and states estimated from the data."""
     extras: Extras
     """Further arguments of the compiled programs."""
+
+    def __post_init__(self):
+        # a number from Python and an element of an array need the same program
+        object.__setattr__(self, "layout", strongly_typed(self.layout))
 
     @staticmethod
     def build(

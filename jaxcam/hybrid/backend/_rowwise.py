@@ -26,6 +26,21 @@ class _Compiled(NamedTuple):
     layout: Layout
     static: Any
 
+    def tree(self, made: np.ndarray):
+        """Return the results as a pytree."""
+        return eqx.combine(self.layout.tree(made), self.static)
+
+
+class Numbers(NamedTuple):
+    """The numbers of one call: those of the shared arguments, `(k,)`, and those of the
+    results, `(count, results)`; and the program, the same object for the same kind of
+    arguments.
+    """
+
+    given: np.ndarray
+    made: np.ndarray
+    program: _Compiled
+
 
 class Rowwise:
     """A function of shared values and of one row, applied to rows that are not traced.
@@ -80,12 +95,20 @@ class Rowwise:
         **Raises:** `Lacking` with the name of an operation that the backend does not
         have.
         """
+        made = self.numbers(shared, rows, count)
+        return made.program.tree(made.made)
+
+    def numbers(self, shared, rows=(), count: int = 1) -> Numbers:
+        """Return the arguments and the results for `count` rows as numbers.
+
+        **Raises:** `Lacking` with the name of an operation that the backend does not
+        have.
+        """
         arrays, static = eqx.partition(shared, eqx.is_array)
-        numbers, layout = laid_out(arrays)
+        given, layout = laid_out(arrays)
         own, row = laid_out(rows, count)
         found = self._compiled(static, layout, row)
-        made = found.function(numbers, own)
-        return eqx.combine(found.layout.tree(made), found.static)
+        return Numbers(given, found.function(given, own), found)
 
     def once(self, shared, *, compiles: bool):
         """Return the result of a function that does not use its row."""

@@ -31,16 +31,18 @@ def assemble(
     state,
     mode,
     log: Log,
-    sizes: tuple[int, int],
+    sizes: tuple[int, int] | None,
     xp: ModuleType = jnp,
     *,
     compiles: bool = False,
 ) -> Parts:
-    """Sort the rows of a log into impacts, contacts, steps and crossings, padded to
-    fixed lengths; `mode` contains the flags at the start.
+    """Sort the rows of a log into impacts, contacts, steps and crossings; `mode`
+    contains the flags at the start.
 
-    With `xp=numpy`, a log that is not traced is sorted without compilation. Functions
-    of the system are then compiled by LLVM if `compiles` is true.
+    Impacts and crossings are padded to the first of the `sizes`, and contacts to the
+    second. With `xp=numpy`, a log that is not traced is sorted without compilation, and
+    without `sizes`, nothing is padded. Functions of the system are then compiled by
+    LLVM if `compiles` is true.
     """
     rows = log.kind.shape[0]
     k = _surfaces(system, t0, state)
@@ -58,11 +60,13 @@ def assemble(
     sides = _sides(xp, kept[:, m : m + k], kept[:, m + k :]) if k else None
     kept = kept[:, :m] if k else kept
     steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1, sides)
-    switches = _switches(xp, log, m, sizes[0]) if k else None
+    of_events, of_contacts = (None, None) if sizes is None else sizes
+    switches = _switches(xp, log, m, of_events) if k else None
     if not m:
         return Parts(*_nothing(xp, state, log), steps, switches)
-    impacts = _impacts(xp, system, log, sizes[0], compiles)
-    return Parts(impacts, _contacts(xp, time, kept, count, sizes[1]), steps, switches)
+    impacts = _impacts(xp, system, log, of_events, compiles)
+    contacts = _contacts(xp, time, kept, count, of_contacts)
+    return Parts(impacts, contacts, steps, switches)
 
 
 def _sides(xp: ModuleType, negative, sliding):
@@ -88,10 +92,11 @@ def _nothing(xp: ModuleType, state, log: Log) -> tuple[Impacts, Contacts]:
     return impacts, Contacts(none, none, none > 0, which, count)
 
 
-def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
+def _switches(xp: ModuleType, log: Log, m: int, size: int | None) -> Switches:
     """Return the events at switching surfaces, which the log numbers from `m` on."""
     crossed = rows_of_kind(log, RowKind.SWITCH, RowKind.SLIDE, RowKind.LEAVE)
     number = xp.sum(crossed)
+    size = int(number) if size is None else size
     index = _places(xp, crossed, size, 0)
     real = xp.arange(size) < number
     which = xp.where(real, log.constraint[index] - m, 0.0).astype(xp.int32)
@@ -108,12 +113,13 @@ def _switches(xp: ModuleType, log: Log, m: int, size: int) -> Switches:
 
 
 def _impacts(
-    xp: ModuleType, system, log: Log, max_impacts: int, compiles: bool
+    xp: ModuleType, system, log: Log, size: int | None, compiles: bool
 ) -> Impacts:
     hits = rows_of_kind(log, RowKind.IMPACT, RowKind.LAST_IMPACT)
     number = xp.sum(hits)
-    index = _places(xp, hits, max_impacts, 0)
-    real = xp.arange(max_impacts) < number
+    size = int(number) if size is None else size
+    index = _places(xp, hits, size, 0)
+    real = xp.arange(size) < number
     t_hit = xp.where(real, log.t[index], xp.inf)
     before = xp.where(real[:, None], log.before[index], xp.nan)
     after = xp.where(real[:, None], log.after[index], xp.nan)
@@ -124,7 +130,7 @@ def _impacts(
     return Impacts(t_hit, before, after, which, hit, left, number)
 
 
-def _contacts(xp: ModuleType, time, kept, count, max_contacts: int) -> Contacts:
+def _contacts(xp: ModuleType, time, kept, count, size: int | None) -> Contacts:
     rows = time.shape[0] - 1
     # a contact begins in the row after its last impact and ends where its flag is
     # cleared
@@ -136,10 +142,12 @@ def _contacts(xp: ModuleType, time, kept, count, max_contacts: int) -> Contacts:
     later = xp.concatenate([time[1:], xp.full_like(time[:1], xp.inf)])
     starts = xp.where(xp.arange(rows + 1) == 0, time, later)
     width = kept.shape[1]
-    flat = _places(xp, began.ravel(), max_contacts, 0)
-    row, column = flat // width, flat % width
+    # a contact that would begin after the last row does not begin
     total = xp.sum(began & (starts[:, None] < xp.inf))
-    real = xp.arange(max_contacts) < total
+    size = int(xp.sum(began)) if size is None else size
+    flat = _places(xp, began.ravel(), size, 0)
+    row, column = flat // width, flat % width
+    real = xp.arange(size) < total
     end = ends[row, column]
     return Contacts(
         xp.where(real, starts[row], xp.inf),
@@ -172,25 +180,20 @@ def _speeds(xp: ModuleType, system, times, sides, which, compiles: bool):
     count = times.shape[0]
     if xp is np and not count:
         return times, times
-    times, which = xp.concatenate([times, times]), xp.concatenate([which, which])
-    states = xp.concatenate(sides)
-    points = times, states, which
+    points = times, *sides, which
     if xp is np:
-        speeds = _VELOCITIES(system, points, 2 * count, compiles=compiles)
-    else:
-        speeds = _normal_velocities(system, *points)
-    return speeds[:count], speeds[count:]
+        return _SPEEDS(system, points, count, compiles=compiles)
+    return _speeds_of(system, points)
 
 
-def _velocity_at(system, point):
-    t, x, which = point
-    return normal_velocity(system, t, x)[which]
+def _speeds_at(system, point):
+    t, before, after, which = point
+    return tuple(normal_velocity(system, t, x)[which] for x in (before, after))
 
 
-_VELOCITIES = Rowwise(_velocity_at)
+_SPEEDS = Rowwise(_speeds_at)
 
 
 @program
-def _normal_velocities(system, times, states, which):
-    speeds = jax.vmap(lambda t, x: normal_velocity(system, t, x))(times, states)
-    return jnp.take_along_axis(speeds, which[:, None], axis=1)[:, 0]
+def _speeds_of(system, points):
+    return jax.vmap(lambda point: _speeds_at(system, point))(points)

@@ -1,6 +1,7 @@
 """Segment recordings into flights, contacts and impacts, on an estimated surface."""
 
 from .._drive import Drive as Drive, read_drive as read_drive
+from .._saturated import saturated as saturated
 from ._fast_speed import (
     fast_speed as fast_speed,
     usual_acceleration as usual_acceleration,

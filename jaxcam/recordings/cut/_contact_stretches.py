@@ -36,10 +36,13 @@ def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
     A second list contains stretches that may be slow impacts or grazing contacts.
     """
     near = motion.gap < LOW * motion.noise
+    moving = np.zeros(len(near), bool) if motion.seen is None else motion.seen.moving
     # a single outlier among thousands of samples is not a flight
-    near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3]
+    near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3] & ~moving
     shortest = max(4, round(SHORTEST_CONTACT / motion.interval))
     long = [pair for pair in stretches(near) if pair[1] - pair[0] >= shortest]
+    if motion.seen is not None:
+        long = [pair for pair in long if not motion.seen.turns(*pair)]
     starts = [first for first, _ in long[1:]] + [len(near)]
     doubtful = [
         (first, last)
@@ -51,6 +54,7 @@ def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
     for first, last in found:
         between = slice(joined[-1][1], first) if joined else slice(0, first)
         low = np.max(motion.gap[between], initial=-np.inf) < HIGH * motion.noise
+        low = low and not np.any(moving[between])
         if low and (joined or first < SHORTEST_FLIGHT):
             first = joined.pop()[0] if joined else 0
         joined.append((first, last))

@@ -16,6 +16,7 @@ from ._contact_stretches import (
     Span,
 )
 from ._impact_marks import away, impact_marks
+from ._impact_speeds import speeds
 from ._kinks import WINDOW
 from ._motion import Motion
 from ._polynomial import crossing, LocalFit
@@ -181,10 +182,14 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
     origin = float(motion.time[place] - motion.interval / 2)
     reach = 5 * motion.interval
     time, stderr = crossing(before, after, origin, reach)
-    if abs(time - origin) >= reach:
+    shown = motion.seen is not None and place in motion.seen.jumps
+    if shown and stderr > motion.interval / 2:
+        time, stderr = origin, motion.interval / 2
+    elif abs(time - origin) >= reach:
         time, stderr = origin, 2 * motion.interval
     surface = float(np.interp(time, motion.time, motion.rate))
-    approach, separation = surface - before.slope(time), after.slope(time) - surface
+    arriving, leaving = speeds(motion, (before, after), (first, place, last), time)
+    approach, separation = surface - arriving.value, leaving.value - surface
     # where the fits meet, the distance from the surface is the mean of both fits with
     # these weights
     shares = np.array([separation, approach])
@@ -197,10 +202,10 @@ def _crossed(motion: Motion, first: int, place: int, last: int) -> dict:
         "angle": motion.sense * 0.5 * (before.value(time) + after.value(time)),
         "angle_stderr": error,
         "turned": float("nan"),
-        "before": motion.sense * before.slope(time),
-        "before_stderr": before.slope_stderr(time),
-        "after": motion.sense * after.slope(time),
-        "after_stderr": after.slope_stderr(time),
+        "before": motion.sense * arriving.value,
+        "before_stderr": arriving.stderr,
+        "after": motion.sense * leaving.value,
+        "after_stderr": leaving.stderr,
         "approach": approach,
         "separation": separation,
         "surface_stderr": 0.0,

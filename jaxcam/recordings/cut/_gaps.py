@@ -8,6 +8,7 @@ from jaxtyping import Float
 from .._drive import Drive
 from .._recording import Recording
 from ._cut import cut
+from ._gap_rate import GapRate
 from ._inside import refuse_inside
 from ._motion import Motion
 from ._placed import placed
@@ -24,6 +25,7 @@ def segment_gaps(
     drive: Drive | None = None,
     restitution: float = 0.5,
     doubted: Sequence[tuple[int, int]] = (),
+    rates: Sequence[Float[np.ndarray, " k"] | None] | None = None,
 ) -> Segments:
     """Segment a recording at the impacts at each gap, given the gaps at every sample.
 
@@ -40,6 +42,8 @@ def segment_gaps(
     - `restitution`: expected value, for impacts too weak to be observed.
     - `doubted`: stretches of samples (the first, and one past the last) that a model of
         the flight does not describe; an impact is sought there.
+    - `rates`: for each gap, its measured rate of change at every sample, or `None` if
+        it is not measured.
 
     **Returns:** the segments; `impacts.side` is the index of the gap that closed, and
     `impacts.before` and `impacts.after` are its rates of change.
@@ -48,9 +52,12 @@ def segment_gaps(
     """
     none = np.zeros(len(recording))
     sides = []
-    for gap, tolerance in zip(gaps, tolerances, strict=True):
+    rates = [None] * len(gaps) if rates is None else rates
+    time, interval = recording.time, recording.interval
+    for gap, tolerance, rate in zip(gaps, tolerances, rates, strict=True):
+        seen = None if rate is None else GapRate.of(time, rate, gap, interval)
         noise = measured_noise(gap)
-        side = Motion(recording.time, gap, none, none, noise, recording.interval)
+        side = Motion(time, gap, none, none, noise, interval, seen=seen)
         sides.append(placed(side, tolerance) if tolerance > 0 else side)
     refuse_inside(recording.name, sides, tolerances)
     flights, contacts, impacts = cut(sides, restitution, doubted)

@@ -15,7 +15,6 @@ from ._contact_stretches import (
     Span,
     stretches,
 )
-from ._kinks import find_kinks
 from ._motion import Motion
 
 
@@ -27,8 +26,7 @@ def impact_marks(
     **Arguments:** `resting` are the stretches of contact, `doubted` those in which an
     impact is expected.
     """
-    kinks = find_kinks(motion.samples, motion.interval, motion.noise)
-    marks = [int(kink) for kink in kinks]
+    marks = motion.jumps()
     near = stretches(motion.gap < LOW * motion.noise)
     for first, last in (*near, *doubted):
         taken = [*resting, *((mark, mark + 1) for mark in marks)]

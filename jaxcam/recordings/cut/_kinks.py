@@ -15,23 +15,28 @@ def find_kinks(
     samples: Float[np.ndarray, " k"],
     interval: float,
     noise: float,
+    *,
+    derivative: int = 1,
 ) -> Int[np.ndarray, " kinks"]:
     """Return the index of the first sample after each jump in velocity.
 
     Parabolas through the `WINDOW` before and after each sample are compared; a kink is
     a local maximum of the jump in slope that exceeds `_THRESHOLD` times its standard
     error.
+
+    **Arguments:** `derivative`: 1 if the samples are positions; 0 if they are
+    velocities, in which a jump separates straight lines.
     """
-    score = _jump_score(samples, interval, noise)
+    score = _jump_score(samples, interval, noise, derivative)
     apart = max(1, int(WINDOW / interval / 2))
     return find_peaks(score, height=_THRESHOLD, distance=apart)[0]
 
 
 def _jump_score(
-    samples: Float[np.ndarray, " k"], interval: float, noise: float
+    samples: Float[np.ndarray, " k"], interval: float, noise: float, derivative: int
 ) -> Float[np.ndarray, " k"]:
-    """Return the jump in slope before each sample divided by its standard error, shape
-    `(k,)`.
+    """Return the jump in a derivative before each sample divided by its standard error,
+    shape `(k,)`.
     """
     count = max(6, round(WINDOW / interval))
     score = np.zeros(len(samples))
@@ -40,12 +45,12 @@ def _jump_score(
     # the boundary is assumed to lie half a sampling interval before the first sample
     # after it; times are measured from there
     offsets = (np.arange(count) + 0.5) * interval
-    design = (offsets / offsets[-1])[:, None] ** np.arange(3)
-    slope = np.linalg.pinv(design)[1] / offsets[-1]
+    design = (offsets / offsets[-1])[:, None] ** np.arange(derivative + 2)
+    weights = np.linalg.pinv(design)[derivative] / offsets[-1] ** derivative
     windows = np.lib.stride_tricks.sliding_window_view(samples, count)
-    after = windows @ slope
-    before = -(windows @ slope[::-1])
+    after = windows @ weights
+    before = (-1) ** derivative * (windows @ weights[::-1])
     jump = after[count:] - before[:-count]
-    error = noise * np.sqrt(2 * np.sum(slope**2))
+    error = noise * np.sqrt(2 * np.sum(weights**2))
     score[count : len(samples) - count + 1] = jump / error
     return score

@@ -5,6 +5,8 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from ._gap_rate import GapRate
+from ._kinks import find_kinks, WINDOW
 from ._polynomial import fit_local, LocalFit
 
 
@@ -22,6 +24,7 @@ class Motion:
     """Samples of a motion, the values that they would have in contact, and their noise.
 
     The motion is above the surface; `sense` is -1 if it was `mirrored` to achieve this.
+    `seen` is the rate of change of the gap, if it is measured.
     """
 
     time: Float[np.ndarray, " k"]
@@ -31,6 +34,7 @@ class Motion:
     noise: float
     interval: float
     sense: float = 1.0
+    seen: GapRate | None = None
 
     def mirrored(self, contact, rate) -> "Motion":
         """Return the motion relative to a surface above it, with position `contact` and
@@ -43,6 +47,18 @@ class Motion:
     @property
     def gap(self) -> Float[np.ndarray, " k"]:
         return self.samples - self.contact
+
+    def jumps(self) -> list[int]:
+        """Return the index of the first sample after each jump in velocity: those that
+        the measured rate shows, and those that only the samples show.
+        """
+        kinks = find_kinks(self.samples, self.interval, self.noise).tolist()
+        if self.seen is None:
+            return kinks
+        shown = self.seen.jumps
+        reach = max(6, round(WINDOW / self.interval))
+        others = [k for k in kinks if not np.any(np.abs(shown - k) <= reach)]
+        return sorted([*shown.tolist(), *others])
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
         """Fit a polynomial to one end of a flight, as far as a cubic can follow the

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 
 from ._jump_point import jump_point
-from ._kinks import find_kinks
 from ._motion import Motion
 
 
@@ -26,7 +25,7 @@ def placed(motion: Motion, tolerance: float) -> Motion:
     """
     time, samples = motion.time, motion.samples
     found = []
-    for kink in find_kinks(samples, motion.interval, motion.noise):
+    for kink in motion.jumps():
         impact = jump_point(time, samples, kink, motion.interval, motion.noise)
         off = impact.before - np.interp(impact.time, time, motion.contact)
         if abs(off) < tolerance + _OUTLIER * impact.stderr:

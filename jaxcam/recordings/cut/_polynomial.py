@@ -46,6 +46,7 @@ def fit_local(
     samples: Float[np.ndarray, " k"],
     noise: float,
     origin: float,
+    most: int = 3,
 ) -> LocalFit:
     """Fit a polynomial by least squares, with a degree from one to three that depends
     on the number of samples.
@@ -54,9 +55,10 @@ def fit_local(
 
     - `noise`: standard deviation of a sample, which determines the covariance.
     - `origin`: time at which the fit will be evaluated.
+    - `most`: the highest degree.
     """
     degree = 3 if len(time) >= 24 else 2 if len(time) >= 8 else 1
-    degree = min(degree, len(time) - 1)
+    degree = min(degree, len(time) - 1, most)
     # times are scaled to about 1, because otherwise the normal matrix is nearly
     # singular
     scale = max(float(np.max(np.abs(time - origin))), np.finfo(float).tiny)

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from .._errors import RecordingError
 from .._recording import Recording
+from .._saturated import saturated
 
 
 # Longest gap (samples) that is bridged; over it, the motion is nearly a parabola
@@ -101,12 +102,12 @@ def _unslipped(
 
 
 def _count_saturated(recording: Recording, name: str, notes) -> None:
-    size = np.abs(recording.channels[name])
-    at_limit = size >= np.max(size) * (1 - 1e-9)
-    # many samples with the same maximum value indicate saturation
-    if np.sum(at_limit) > max(3, 0.002 * len(size)):
+    samples = recording.channels[name]
+    at_limit = saturated(samples)
+    if np.any(at_limit):
         notes.append(
-            f"{recording.name}: `{name}` is saturated at {np.max(size):.4g} in "
+            f"{recording.name}: `{name}` is saturated at "
+            f"{np.max(np.abs(samples)):.4g} in "
             f"{np.mean(at_limit):.1%} of its samples."
         )
 

@@ -1,0 +1,63 @@
+"""Read a number of a rig file, with its tolerance and bounds."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..recordings.files import known_keys, printable, Section, shown_value
+from .engine import Parameter
+
+
+NUMBER = ("value", "tolerance", "lower", "upper", "unit")
+"""Keys that a number with a tolerance may have."""
+
+
+class Stated(NamedTuple):
+    """A value of a rig file; without a tolerance, it is held fixed."""
+
+    value: float | bool | str
+    tolerance: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    unit: str = ""
+
+    def parameter(self, name: str, where: Callable, unit: str = "") -> Parameter:
+        """Return the parameter of a fit, with the `unit` if the file gives none."""
+        return Parameter(
+            name,
+            where,
+            self.tolerance,
+            lower=self.lower,
+            upper=self.upper,
+            unit=self.unit or unit,
+        )
+
+
+def stated(section: Section, key: str) -> Stated:
+    """Read one entry: a number, a flag or a word, or a table with `NUMBER` keys."""
+    entry = section.table[key]
+    if isinstance(entry, bool | str):
+        return Stated(entry)
+    if not isinstance(entry, dict):
+        return Stated(section.as_number(key, entry))
+    known_keys(section.file, f"{section.name}.{printable(key)}", entry, NUMBER)
+    if "value" not in entry:
+        raise section.error(key, "has no `value`")
+    value = section.as_number(key, entry["value"])
+    lower, upper = (
+        section.as_number(key, entry[which]) if which in entry else otherwise
+        for which, otherwise in (("lower", -math.inf), ("upper", math.inf))
+    )
+    if not lower <= value <= upper or lower == upper:
+        raise section.error(
+            key, f"is {value:g}, and must be between {lower:g} and {upper:g}"
+        )
+    tolerance = entry.get("tolerance", 0.0)
+    if tolerance != math.inf:
+        tolerance = section.as_number(key, tolerance)
+    if tolerance < 0:
+        raise section.error(key, f"has the negative tolerance {tolerance:g}")
+    unit = entry.get("unit", "")
+    if not isinstance(unit, str):
+        raise section.error(key, f"has the unit {shown_value(unit)}, which is not text")
+    return Stated(value, float(tolerance), lower, upper, unit)

@@ -1,0 +1,97 @@
+"""Run one trajectory in a loop compiled by LLVM."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._started import started
+from .backend import Attempts, attempts_of, key_of, laid_out, Rowwise
+from .caches import Cache
+from .codes import RUNNING
+from .loop import Log, log_of, LoopState, numbers_of_row
+
+
+def _start(case, _=None):
+    """Return the plan and the first loop state of a run of a prepared system."""
+    _, plan, carried = started(*case, differentiable=False, shared=True)
+    return plan, jax.tree.map(jnp.asarray, carried)
+
+
+_STARTED = Rowwise(_start, width=1)
+_LOOPS = Cache()
+
+
+class _Loop(NamedTuple):
+    """The loop of runs whose arguments have the same kinds, and where it finds its
+    numbers.
+    """
+
+    attempts: Attempts
+    # how many numbers belong to the system, of those given; and to the plan, of those
+    # computed for the start
+    system: int
+    plan: int
+    # the place of each scalar in the state of the loop
+    place: LoopState
+
+    @staticmethod
+    def of(system, plan, carried: LoopState) -> "_Loop":
+        arrays, static = eqx.partition((system, plan), eqx.is_array)
+        sizes = [laid_out(part)[1].size for part in arrays]
+        _, shared = laid_out(arrays)
+        _, nothing = laid_out(jax.tree.map(lambda _: None, arrays))
+        numbers, lane = laid_out(carried)
+        attempts = attempts_of(key_of(static, nothing, shared, carried, _row, 1))
+        place = jax.tree.unflatten(lane.structure, range(len(numbers)))
+        return _Loop(attempts, *sizes, place)
+
+
+def _row(record, lane: LoopState):
+    """Return the place of an attempted step in the log, and the numbers of its row."""
+    return lane.steps - 1.0, numbers_of_row(record)
+
+
+def run_compiled(
+    case: tuple, budget: int, chunk: int, progress: Callable[[float], None]
+) -> tuple[Log, np.ndarray, Any]:
+    """Return the log of the accepted steps, the initial mode, and the status.
+
+    **Arguments:** the prepared system, the settings, t0, the state and t1; the maximum
+    number of attempted steps; the number of attempts in a chunk; and a function that is
+    called with the time (s) after each chunk.
+
+    **Raises:** `Lacking` with the name of an operation that the backend does not have.
+    """
+    started = _STARTED.numbers(case)
+    program = started.program
+
+    def make():
+        first = jax.tree.map(
+            lambda a: a[0] if isinstance(a, np.ndarray) else a,
+            program.tree(started.made),
+        )
+        return _Loop.of(case[0], *first)
+
+    loop = _LOOPS.get(program.function, make)
+    made = started.made[0]
+    shared = np.concatenate([started.given[: loop.system], made[: loop.plan]])
+    lane, own = made[None, loop.plan :].copy(), np.zeros((1, 0))
+    place = loop.place
+    mode = lane[0, list(place.mode)] > 0.5
+    tables, used = [], 0
+    while True:
+        size = min(chunk, budget - used)
+        table = np.zeros((1, size, loop.attempts.sizes.row))
+        loop.attempts.run(shared, own, lane, table, first=used, limit=used + size)
+        # failed attempts leave a row of the kind `RowKind.NOTHING`, which is zero
+        tables.append(table[0, np.flatnonzero(table[0, :, 0] > 0)])
+        used += size
+        if lane[0, place.status] != RUNNING or used >= budget:
+            break
+        progress(lane[0, place.t])
+    log = log_of(np.concatenate(tables), len(place.x))
+    return log, mode, lane[0, place.status]
