@@ -130,6 +130,22 @@ EFFECTS = {
         0.05,
         0.15,
     ),
+    # products of two functions of one argument
+    "zone_damper": _force(
+        _ON_THE_WAY, lambda u, w, phi, t, s: -w * _within(u, 0.1, 0.6), 0.05, 0.15
+    ),
+    "zone_cubic": _force(
+        _ON_THE_WAY, lambda u, w, phi, t, s: -(w**3) * _within(u, -0.2, 0.5), 0.1, 0.3
+    ),
+    "softening": _force(
+        _ON_THE_WAY, lambda u, w, phi, t, s: u * np.exp(-((w / 0.4) ** 2)), 0.04, 0.12
+    ),
+    "pulled_end": _force(
+        ("phase", "position"),
+        lambda u, w, phi, t, s: np.cos(phi - 1.0) * (u > 0.2),
+        0.04,
+        0.12,
+    ),
     # of the drive angle
     "pulse": _force(
         ("phase",), lambda u, w, phi, t, s: 1.0 * (np.cos(phi - 2.0) > 0.6), 0.02, 0.06

@@ -10,7 +10,9 @@ from benchmarks.own_rigs import RIGS
 from benchmarks.unnamed import hidden_case, judged
 from jaxcam.discrepancy import diagnose, Policy
 from jaxcam.discrepancy.evidence import _rivals, _unnamed
+from jaxcam.discrepancy.search import Missing, Shuffled
 from jaxcam.discrepancy.search._local_force import _in_reverse, Response
+from jaxcam.discrepancy.search._shuffled import _at_other_moments
 from jaxcam.discrepancy.terms import Place
 from jaxcam.discrepancy.terms._primitives import PRIMITIVES
 from jaxcam.fitting import read_setup
@@ -42,6 +44,45 @@ def test_a_decoy_acts_in_the_reverse_order_of_time():
         before, after = forces[row, seen].ravel(), found[row, seen].ravel()
         np.testing.assert_array_equal(after, before[::-1])
         np.testing.assert_array_equal(found[row, ~seen], forces[row, ~seen])
+
+
+def test_a_knock_off_acts_at_other_moments_of_its_recording():
+    """At least a tenth of the recording away, counted around its ends; padding is left
+    as it is, and two knock-offs differ."""
+    exists = np.array([[True] * 40, [True, False] * 20])
+    response = Response(*([None] * len(Response._fields)))._replace(exists=exists)
+    forces = np.arange(2 * 40 * 5, dtype=float).reshape(2, 40, 5, 1)
+    rng = np.random.default_rng(3)
+    one, other = (_at_other_moments(response, forces, rng) for _ in range(2))
+    assert np.any(one != other)
+    for row, seen in enumerate(exists):
+        np.testing.assert_array_equal(one[row, ~seen], forces[row, ~seen])
+        own = forces[row, seen].ravel()
+        taken = np.searchsorted(own, one[row, seen].ravel())
+        np.testing.assert_array_equal(own[taken], one[row, seen].ravel())
+        shift = (taken - np.arange(len(own))) % len(own)
+        assert np.all((shift >= 0.1 * len(own)) & (shift <= 0.9 * len(own)))
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.99, True), (1.01, False)])
+def test_a_force_that_a_knock_off_equals_is_not_reported(
+    share, kept, monkeypatch, unchecked_types
+):
+    """The force is kept if the best knock-off explains less than the force, 99 %."""
+    compared = (Shuffled("flight time", ("time",), (share, 0.2)),)
+    inclusion = SimpleNamespace(inclusion={"flight time": 1.0})
+    monkeypatch.setattr(_unnamed, "needs", lambda *_, **__: inclusion)
+    fits = SimpleNamespace(parts=lambda _: {"flight time": []}, prices=lambda _: {})
+    search = SimpleNamespace(
+        policy=Policy(), fits=fits, first=(), shuffled=lambda *_: compared
+    )
+    fitted = SimpleNamespace(problem=None, free=())
+    part = SimpleNamespace(label="flight time")
+    found = Missing((part,), frozenset(), fitted, 1.0, None)  # pyright: ignore
+    chance = []
+    left, _ = _unnamed._needed(search, found, 2.0, 0, chance)  # pyright: ignore
+    assert (left is not None and left.shuffled == compared) is kept
+    assert tuple(chance) == (() if kept else compared)
 
 
 @pytest.mark.slow

@@ -77,6 +77,9 @@ class Policy:
     near_cost: float = decides(
         4.0, "cost per sample below which a fit counts as near the data"
     )
+    knock_offs: int = decides(
+        19, "number of knock-offs of a force, each of which must explain less than it"
+    )
     explains: float = decides(
         0.5,
         "far from the data, maximum fraction of a smaller model's cost that a model "
@@ -197,9 +200,7 @@ class Policy:
     explained: float = bounds(
         1.2, "cost per sample below which a fit is never stopped early"
     )
-    crawl_steps: int = bounds(
-        2, "number of final steps used to detect slow convergence"
-    )
+    crawl_steps: int = bounds(2, "number of steps used to detect slow convergence")
     crawl_attempts: int = bounds(
         4, "minimum number of step attempts during these steps"
     )
@@ -299,8 +300,7 @@ class Policy:
         0.5, "fraction of a function's gain that its decoy may reach without a caveat"
     )
     units_doubted: float = shows(
-        1000.0,
-        "rms residual, in units of the noise, above which a caveat doubts the units",
+        1000.0, "rms residual, in noises, above which a caveat doubts the units"
     )
     moved_errors: float = shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"

@@ -63,10 +63,7 @@ def rivals(
 
 def _parts(one: Missing) -> frozenset[str]:
     """Return the names of the terms, functions and forms in a fit."""
-    forms = {
-        f"{part.label}: {getattr(getattr(part, 'primitive', None), 'name', '')}"
-        for part in one.functions
-    }
+    forms = {f"{part.label}: {getattr(part, 'form', '')}" for part in one.functions}
     return one.names | forms
 
 

@@ -5,7 +5,15 @@ import math
 from typing import NamedTuple
 
 from ..policy import Policy
-from ..search import decoys_of, FreeSearch, Missing, Question, Trial, Trials
+from ..search import (
+    decoys_of,
+    FreeSearch,
+    Missing,
+    Question,
+    Shuffled,
+    Trial,
+    Trials,
+)
 from ..terms import families, gaps_of
 from ._held_out import held_out, HeldOut
 from ._redrawn import Needs, needs
@@ -18,12 +26,14 @@ class Unnamed(NamedTuple):
     """Unnamed functions, `None` if there are none, and the evidence for them.
 
     `needs` are their bootstrap results, and `rivals` are other functions that were
-    fitted in their place.
+    fitted in their place. `by_chance`: forces that are not reported, because a
+    knock-off explains as much.
     """
 
     found: Missing | None = None
     needs: Needs | None = None
     rivals: tuple[Rival, ...] = ()
+    by_chance: tuple[Shuffled, ...] = ()
 
     @property
     def score(self) -> float:
@@ -61,6 +71,8 @@ def without_a_name(
         strides=visited.strides,
     )
 
+    by_chance: list[Shuffled] = []
+
     def searched(elements: bool, policy: Policy = policy):
         search = FreeSearch(
             problem,
@@ -74,7 +86,7 @@ def without_a_name(
             trials.clock,
             bool(question.model_errors),
         )
-        return search, *_needed(search, search.run(), best.bic, seed)
+        return search, *_needed(search, search.run(), best.bic, seed, by_chance)
 
     # elements with an internal state are tried only if functions may not suffice
     always = policy.elements > 1
@@ -88,7 +100,7 @@ def without_a_name(
             results.append(searched(False, dataclasses.replace(policy, elements=0)))
     kept = [(one, its) for _, one, its in results if one is not None]
     if not kept:
-        return Unnamed()
+        return Unnamed(by_chance=tuple(by_chance))
     chosen, its_needs = min(kept, key=lambda each: each[0].score)
     tried = [one for search, _, _ in results for one in search.tried]
     return Unnamed(chosen, its_needs, rivals(chosen, tried, policy, seed))
@@ -106,9 +118,14 @@ def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:
 
 
 def _needed(
-    search: FreeSearch, found: Missing | None, bic: float, seed: int
+    search: FreeSearch,
+    found: Missing | None,
+    bic: float,
+    seed: int,
+    by_chance: list[Shuffled],
 ) -> tuple[Missing | None, Needs | None]:
-    """Drop functions and terms that the bootstrap samples do not retain.
+    """Drop functions and terms that the bootstrap samples do not retain, and forces
+    that explain no more than their knock-offs, which are added to `by_chance`.
 
     **Returns:** the fit with the others, and their bootstrap results; `None` for both
     if no function is left, or if the score of the fit is not below `bic`.
@@ -122,7 +139,14 @@ def _needed(
         )
         least = min(needed.inclusion, key=lambda one: needed.inclusion[one])
         if needed.inclusion[least] >= policy.confidence:
-            return found._replace(decoys=decoys_of(search.first or (), found)), needed
+            compared = search.shuffled(found, seed)
+            chance = [one for one in compared if one.by_chance]
+            if not chance:
+                decoys = decoys_of(search.first or (), found)
+                return found._replace(decoys=decoys, shuffled=compared), needed
+            worst = max(chance, key=lambda one: one.best)
+            by_chance.append(worst)
+            least = worst.label
         if len(parts) < 2:
             break
         found = search.without(found, least)

@@ -15,7 +15,7 @@ from ..evidence import (
     rms_of,
 )
 from ..policy import Policy
-from ..search import Question, Trial, Trials
+from ..search import Question, Shuffled, Trial, Trials
 from ._words import listed, number, percent, quantity, ratio, spelled
 
 
@@ -30,6 +30,7 @@ class Reason(enum.StrEnum):
     FAR_FROM_DATA = "far from the data"
     TIE = "tie"
     DECOY = "a decoy explains much"
+    CHANCE = "no more than a knock-off"
     NOT_SHARED = "not shared by the records"
     DIFFERING = "a parameter differs"
     POOR_PREDICTION = "poor prediction"
@@ -262,6 +263,17 @@ def decoy_explains(share: float) -> Caveat:
         "Evaluated along the time-reversed motion, the function would explain "
         f"{share:.0%} of what it explains along the measured motion, so these "
         "recordings hardly show when the force acts. Record less periodic motions.",
+    )
+
+
+def by_chance(one: Shuffled) -> Caveat:
+    """Return the caveat that a force explains no more than one of its knock-offs."""
+    return Caveat(
+        Reason.CHANCE,
+        f"A force that depends on {listed(one.arguments)} fits the recordings, but of "
+        f"{len(one.shares)} functions of the same kind that take their arguments at "
+        f"other moments, the best explains {percent(one.best)} of what it explains. It "
+        "is therefore not reported. Record more motions under the same conditions.",
     )
 
 

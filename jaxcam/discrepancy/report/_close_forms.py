@@ -67,5 +67,4 @@ def _only_form(missing: Missing, other: Missing) -> tuple[Free | None, Free | No
 
 
 def _form_of(part: Free | Hidden) -> str | None:
-    form = None if isinstance(part, Hidden) else part.primitive
-    return None if form is None else form.name
+    return None if isinstance(part, Hidden) else part.form

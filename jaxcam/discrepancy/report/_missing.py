@@ -34,6 +34,7 @@ from ._curves import (
 )
 from ._formula import formula_of
 from ._hidden import hidden_formula, hidden_table, hidden_unit, hidden_words
+from ._product import product_of, product_slopes, product_table
 
 
 _KINDS = {
@@ -74,6 +75,8 @@ class MissingFunction:
     - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
     - `nearly`: otherwise the formula of the best form, if it is close.
+    - `knock_offs`: for a force, the number of knock-offs, which take its arguments at
+        other moments, and the gain of the best of them as a fraction of its own.
     - `element`: for a force with an internal state, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
     - `gap`: for an effect at impacts or of the surface, the name of the gap if there
@@ -93,6 +96,7 @@ class MissingFunction:
     numbers: tuple[str, ...] = ()
     gap: str = ""
     nearly: str | None = None
+    knock_offs: tuple[int, float] | None = None
 
     @property
     def slot(self) -> str:
@@ -109,6 +113,8 @@ class MissingFunction:
             "unit": self.unit,
             "formula": self.formula,
             "nearly": self.nearly,
+            "knock_offs": self.knock_offs
+            and dict(zip(("tried", "best"), self.knock_offs)),
             "gap": self.gap or None,
             "words": self.words,
             "records": list(self.records),
@@ -128,10 +134,14 @@ def missing_functions(
     functions of two arguments), the closest parametric forms, by the slots of the
     functions, and the policy.
     """
+    compared = {one.label: (len(one.shares), one.best) for one in missing.shuffled}
     return tuple(
         _hidden(missing.fit, one, policy.shape_points)
         if isinstance(one, Hidden)
-        else _one(missing.fit, one, velocities, positions, close.get(one.slot), policy)
+        else dataclasses.replace(
+            _one(missing.fit, one, velocities, positions, close.get(one.slot), policy),
+            knock_offs=compared.get(one.label),
+        )
         for one in missing.functions
     )
 
@@ -165,6 +175,22 @@ def _one(
     family, kind = one.family, _KINDS[one.family.where]
     numbers = np.array([found[name].value for name in one.coefficients])
     covariance = covariance_of(found, one.coefficients, policy)
+    if one.gate is not None:
+        points = policy.shape_points // 2
+        grid, value, error = product_table(one, numbers, covariance, points)
+        formula, words = product_of(one, numbers)
+        return MissingFunction(
+            kind,
+            one.arguments,
+            grid,
+            value,
+            error,
+            _unit(family),
+            words,
+            found.problem.records,
+            formula,
+            numbers=tuple(one.coefficients),
+        )
     arguments = tuple(_ARGUMENT_NAMES.get(a, str(a)) for a in family.arguments)  # pyright: ignore
     # a table of two arguments has half as many points along each of them
     points = policy.shape_points // 2 if len(arguments) > 1 else policy.shape_points
@@ -219,6 +245,8 @@ def _formula(found: Fit, form: Free) -> tuple[str, str]:
     assert form.primitive is not None
     numbers = np.array([found[name].value for name in form.coefficients])
     kind = _KINDS[form.family.where]
+    if form.gate is not None:
+        return product_of(form, numbers)
     return formula_of(form.family, form.primitive, numbers, kind)
 
 
@@ -236,7 +264,7 @@ def named_function(found: Fit, one: Free | Hidden) -> str:
         return one.label
     kind = _KINDS[one.family.where]
     if one.primitive is None:
-        return f"{kind} as a function of {' and '.join(one.family.arguments)}"
+        return f"{kind} as a function of {' and '.join(one.arguments)}"
     return f"{kind} {_formula(found, one)[0]}"
 
 
@@ -244,13 +272,15 @@ def slopes_of_function(
     found: Fit, one: MissingFunction, points: int = 100
 ) -> Float[np.ndarray, "points p"]:
     """Return the derivatives of a function, without its factor, with respect to its
-    parameters.
+    parameters; those of a product on a grid of about as many points.
     """
     (term,) = (
         term.exact()
         for term in terms_of(found.model())
         if isinstance(term, FreeFunction) and term.label == one.slot
     )
+    if term.gate is not None:
+        return product_slopes(term, points)
     along = jnp.linspace(term.low, term.high, points)
     direction = jnp.tanh(along / term.slip) * term.jumping
     numbers = jnp.stack(term.coefficients[: len(one.numbers)])

@@ -25,6 +25,7 @@ from ._alternatives import (
 )
 from ._caveats import (
     above_noise,
+    by_chance,
     Caveat,
     caveats_of,
     decoy_explains,
@@ -209,6 +210,7 @@ def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[C
         found = choice.rejected.functions
         parts = [named_function(found.fit, part) for part in found.functions]
         yield not_predictive(choice.rejected, " and a ".join(parts))
+    yield from map(by_chance, choice.unnamed.by_chance)
     yield from units_in_doubt(question, choice, trials.policy)
     yield from out_of_time(trials)
 

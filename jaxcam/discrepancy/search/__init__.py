@@ -36,6 +36,7 @@ from ._reference_speed import with_fitted_speed as with_fitted_speed
 from ._rig_question import rig_question as rig_question
 from ._roughness import occam as occam, Roughness as Roughness, roughness as roughness
 from ._search import Search as Search
+from ._shuffled import Shuffled as Shuffled
 from ._slots import Free as Free, free_term as free_term
 from ._system_question import (
     setup_question as setup_question,

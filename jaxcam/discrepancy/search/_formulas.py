@@ -134,7 +134,7 @@ def _sound(trial: Missing, one: Free) -> bool:
     form = _in_slot(trial, one.slot)
     assert isinstance(form, Free) and form.primitive is not None
     numbers = [trial.fit[name].value for name in form.coefficients]
-    return math.isfinite(trial.score) and form.primitive.within(numbers)
+    return math.isfinite(trial.score) and form.within(numbers)
 
 
 def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:

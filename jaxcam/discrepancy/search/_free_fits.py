@@ -31,6 +31,7 @@ class Missing(NamedTuple):
         function).
     - `problem`: the problem with slots for the functions; that of `fit` contains their
       priors.
+    - `shuffled`: the gains of knock-offs of each force.
     - `decoys`: for each label, the predicted gain of a function of the same family that
       is reversed in time, as a fraction of the gain of the function itself.
     """
@@ -41,6 +42,7 @@ class Missing(NamedTuple):
     score: float
     problem: Problem
     decoys: tuple[tuple[str, float], ...] = ()
+    shuffled: tuple[Any, ...] = ()
 
 
 class Subset(NamedTuple):

@@ -24,7 +24,9 @@ from ._hidden_signals import driven_by
 from ._hidden_state import started
 from ._leads import Lead, Leads, shows_apart
 from ._left_out import LeftOut
+from ._product_search import Products
 from ._recentre import recentred
+from ._shuffled import Shuffled, shuffled
 from ._slots import emptied, Free, roomy
 
 
@@ -77,6 +79,8 @@ class FreeSearch:
         if not roughly:
             extras = separated(self.problem.extras)
             self.apart = dataclasses.replace(self.problem, extras=extras)
+        both = self.apart, self.problem
+        self.products = Products(self.fits, families, both, progress, self.clock)
 
     def run(self) -> Missing | None:
         """Return the functions and terms found, or `None` if none is significant.
@@ -84,6 +88,16 @@ class FreeSearch:
         The search ends as soon as it prefers an element that is not a candidate.
         """
         bare = self._bare(self.apart, self.problem.start)
+        found = self._functions(bare)
+        if found is None or not self.first:
+            return found
+        least, small = self.first[0].gain + self._least(), self._small(found)
+        trials = self.products.tried(bare, found, least, small)
+        self.tried += trials
+        return min((found, *trials), key=lambda trial: trial.score)
+
+    def _functions(self, bare: Missing) -> Missing | None:
+        """Return functions of one argument and terms, or `None`."""
         found = self._grown(bare, True)
         if self.need.preferred:
             return None
@@ -106,8 +120,7 @@ class FreeSearch:
             curve, found = whole, self._formulated(whole)
         if len(found.functions) > 1 or found.names:
             return found
-        # a form may score slightly worse than the free function that it replaces, so
-        # the better of both scores counts
+        # a form may score slightly worse than the function that it replaces
         best = min(curve.score, found.score)
         for lead in self._others():
             if leaves_noise(self.fits, found, self._small(found)) or self.clock.over:
@@ -176,8 +189,7 @@ class FreeSearch:
 
         This is the case if an element is preferred to every function, or if it may
         explain a residual that the functions leave. If model errors are allowed for, a
-        residual always remains, and elements are tried only if the functions explain
-        little.
+        residual always remains, and the functions must explain little.
         """
         if self.need.preferred or not self.falls_short(found):
             return self.need.preferred
@@ -196,9 +208,8 @@ class FreeSearch:
         return not leaves_noise(self.fits, found, self._small(found))
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
-        return self.fits.fitted(
-            Subset(problem, (), frozenset()), start, self.policy.iterations
-        )
+        nothing = Subset(problem, (), frozenset())
+        return self.fits.fitted(nothing, start, self.policy.iterations)
 
     def _tight(self, found: Missing) -> Subset:
         return Subset(self.problem, found.functions, found.names)
@@ -332,6 +343,10 @@ class FreeSearch:
             if trial.score < found.score:
                 return self._swapped(trial)
         return found
+
+    def shuffled(self, found: Missing, seed: int) -> tuple[Shuffled, ...]:
+        """Return the gains of the knock-offs of all forces."""
+        return shuffled(self.fits, self.apart, found, self.policy, seed)
 
     def without(self, found: Missing, label: str) -> Missing:
         """Return the fit without the function or term that has the given label."""

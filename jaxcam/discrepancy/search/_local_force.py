@@ -149,6 +149,24 @@ def force_blocks(
     forces = forces_at_nodes(problem, response, terms) * scale
     if decoy:
         forces = _in_reverse(response, forces)
+    return blocks_at_nodes(
+        problem, response, forces, [p.name for p in strengths], scale
+    )
+
+
+def blocks_at_nodes(
+    problem: Problem,
+    response: Response,
+    forces: Float[np.ndarray, "r k l p"],
+    names: Sequence[str],
+    scale: Float[np.ndarray, " p"],
+) -> Blocks:
+    """Return the score and the information of the free parameters and of forces given
+    at the nodes of every piece.
+
+    **Arguments:** the accelerations for a change of each strength by its scale, and the
+    names and scales of the strengths.
+    """
     width, size = forces.shape[-1], len(response.prior)
     chain = _chained(_onto(response, forces))
     found = jax.tree.map(np.asarray, eliminate_states(chain))
@@ -165,7 +183,7 @@ def force_blocks(
         score.append(right)
     none = np.zeros(width)
     return Blocks(
-        (*response.names, *(p.name for p in strengths)),
+        (*response.names, *names),
         np.concatenate([response.scale, scale]),
         problem.records,
         np.zeros(len(problem.records)),

@@ -14,10 +14,12 @@ import numpy as np
 from jaxtyping import Array
 
 from ...fitting import Model, Problem
+from ...fitting.engine import parameter_places
 from ..terms import (
     Family,
     FREE,
     FreeFunction,
+    Gate,
     HiddenForce,
     more_faults,
     Primitive,
@@ -47,21 +49,37 @@ _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution"), (Where.CONTACT, "surface"))
 class Free:
     """A fitted free function: its family, its prior, and its slot.
 
-    With a `primitive`, the function has that form and no smoothness prior.
+    With a `primitive`, the function has that form and no smoothness prior. With a
+    `gate`, it is the product of that form and a second one.
     """
 
     family: Family
     roughness: Roughness
     slot: str
     primitive: Primitive | None = None
+    gate: Gate | None = None
 
     @property
     def label(self) -> str:
-        return self.family.name
+        if self.gate is None:
+            return self.family.name
+        return f"{self.family.name} times {self.gate.family.argument}"
+
+    @property
+    def form(self) -> str:
+        """Return the name of the form or product; empty for a sum of sines."""
+        name = "" if self.primitive is None else self.primitive.name
+        return name if self.gate is None else f"{name} x {self.gate.primitive.name}"
 
     @property
     def where(self) -> Where:
         return self.family.where
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Return the names of all arguments."""
+        more = () if self.gate is None else self.gate.family.arguments
+        return tuple(dict.fromkeys((*self.family.arguments, *more)))
 
     @property
     def smooth(self) -> bool:
@@ -72,13 +90,16 @@ class Free:
     def jumps(self) -> bool:
         """Return whether the function is a force that jumps at edges."""
         form = self.primitive
-        return self.where is Where.FLIGHT and form is not None and form.sharp
+        sharp = form is not None and form.sharp
+        if self.gate is not None:
+            sharp |= self.gate.primitive.sharp
+        return self.where is Where.FLIGHT and sharp
 
     def price(self, samples: int) -> float:
         """Return the gain that the function's parameters require, without the Occam
         factor of its prior.
         """
-        count = 0 if self.primitive is None else self.primitive.count
+        count = 0 if self.primitive is None else len(self.coefficients)
         return count * math.log(samples)
 
     @property
@@ -86,7 +107,8 @@ class Free:
         """Return the names of the function's parameters in the fit."""
         sines = _SINES[self.family.where] + 1
         count = self.primitive.count if self.primitive else sines
-        return [f"{self.slot}_{k}" for k in range(count)]
+        places = (*range(count), *(self.gate.places if self.gate else ()))
+        return [f"{self.slot}_{k}" for k in places]
 
     @property
     def spread(self) -> np.ndarray:
@@ -95,7 +117,18 @@ class Free:
         """
         if self.primitive is None:
             return spread_of(self.family, self.roughness)
-        return np.array([self.roughness.size, *self.primitive.scales])
+        more = () if self.gate is None else self.gate.primitive.scales
+        return np.array([self.roughness.size, *self.primitive.scales, *more])
+
+    def within(self, numbers: Sequence[float]) -> bool:
+        """Return whether the parameters of a form, or of both forms, are valid."""
+        assert self.primitive is not None
+        count = self.primitive.count
+        if self.gate is not None:
+            gate = self.gate.primitive
+            if not gate.within([1.0, *numbers[count:]]):
+                return False
+        return self.primitive.within(numbers[:count])
 
 
 # functions and elements for the slots of a problem
@@ -155,11 +188,16 @@ def slots_of(problem: Problem, where: Where, gap: int = 0) -> list[str]:
 
 
 def free_term(
-    family: Family, label: str, primitive: Primitive | None = None
+    family: Family,
+    label: str,
+    primitive: Primitive | None = None,
+    gate: Gate | None = None,
 ) -> FreeFunction:
-    """Return a zero function of a family, with a given form if there is one."""
+    """Return a zero function of a family, with a given form, or a product of two, if
+    there is one.
+    """
     zero = [0.0] * (_SINES[family.where] + 1)
-    return FREE[family.where].of(family, label, zero, primitive)
+    return FREE[family.where].of(family, label, zero, primitive, gate)
 
 
 def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
@@ -177,7 +215,7 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
             problem = with_hidden(problem, one)
             continue
         place = _place(problem, one.slot)
-        fresh = free_term(one.family, one.slot, one.primitive)
+        fresh = free_term(one.family, one.slot, one.primitive, one.gate)
 
         def put(model: Model, place=place, fresh=fresh) -> Model:
             old = terms_of(model)[place]
@@ -211,6 +249,11 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
                 for p in problem.parameters
             ),
         )
+        if one.gate is not None:
+            # a second form adds leaves to the model
+            places = parameter_places(problem.layout.model, problem.parameters)
+            layout = dataclasses.replace(problem.layout, places=places)
+            problem = dataclasses.replace(problem, layout=layout)
     return problem
 
 

@@ -41,8 +41,10 @@ from ._primitives import (
     MOST_PARTS as MOST_PARTS,
     Place as Place,
     Primitive as Primitive,
+    PRIMITIVES as PRIMITIVES,
     sum_of as sum_of,
 )
+from ._products import Gate as Gate, GATE_PLACES as GATE_PLACES
 from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import (
     more_faults as more_faults,

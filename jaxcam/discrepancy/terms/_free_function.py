@@ -15,17 +15,14 @@ from jaxtyping import Array, Bool, Float
 
 from ...fitting import Parameter
 from ._families import Factor, Family
-from ._primitives import MOST_NUMBERS, MOST_PARTS, Place, Primitive, PRIMITIVES
+from ._free_splines import BEYOND, interpolated, knots_of, splines
+from ._primitives import MOST_PARTS, Primitive, PRIMITIVES
+from ._products import Gate, GATE_PLACES
 from ._shapes import Variable
 from ._term import Motion, Term, terms_of
 from ._where import Where
 
 
-# Knots of the spline that represents a function: two per edge of a form, which is
-# smoothed over a hundredth of the range
-_KNOTS = 332
-# The spline continues beyond either end by this fraction of the range
-_BEYOND = 0.15
 _ARGUMENTS = (Variable.POSITION, Variable.VELOCITY, Variable.PHASE, Variable.TIME)
 """Arguments, in the order of the weights that select them."""
 _FACTORS = (Factor.ONE, Factor.VELOCITY, Factor.DIRECTION, Factor.DEFLECTION)
@@ -46,113 +43,21 @@ def _numbers(values) -> tuple[Array, ...]:
     return tuple(jnp.asarray(value, dtype=float) for value in values)
 
 
-def _shares(knots, reach):
-    """Return weights `(n, n)` that average values at knots over an integration step.
-
-    **Arguments:** the knots, and the distance at which the weights vanish; zero for no
-    averaging.
-    """
-    reach = jax.lax.stop_gradient(reach)
-    apart = jnp.abs(knots[:, None] - knots[None])
-    near = 1 - apart / jnp.where(reach > 0, reach, 1.0)
-    shares = jnp.where(apart < reach, near, jnp.eye(_KNOTS))
-    return shares / jnp.sum(shares, axis=1, keepdims=True)
-
-
-def _knots(low, high):
-    """Return the start of the spline and the spacing of its knots."""
-    width = high - low
-    return low - _BEYOND * width, width * (1 + 2 * _BEYOND) / (_KNOTS - 3)
-
-
-# compiled separately, so that it is traced once for all functions of a program
-@jax.jit
-def _splines(numbers, forms, waves, ends, jumping, stride):
-    """Return the coefficients of the spline, those for its derivatives if they differ
-    (otherwise `None`), and the jump.
-    """
-    (rates, shifts), (low, high) = waves, ends
-    first, spacing = _knots(low, high)
-    knots = first + spacing * (jnp.arange(_KNOTS, dtype=float) - 1.0)
-    place = Place.between(knots, low, high)
-
-    def both(table, apart=None):
-        if stride is None:
-            return table, None
-        if apart is None:
-            return table, table
-        reach = jnp.minimum(stride, apart * (high - low))
-        return table, _shares(knots, reach) @ table
-
-    def nothing(own):
-        return both(jnp.zeros(_KNOTS)), jnp.zeros(())
-
-    def sines(own):
-        each = jnp.stack(numbers[:-1]) * 3 / (2 + jnp.cos(rates * spacing))
-        phases = jnp.outer(knots, rates) + shifts[None]
-        return both(jnp.sin(phases) @ each), jumping * numbers[-1]
-
-    def of(one: Primitive):
-        def form(own):
-            apart = None if one.apart is None else one.apart(own)
-            return both(one.function(place, own), apart), one.jump * own[0]
-
-        return form
-
-    options = [nothing, sines, *map(of, PRIMITIVES)]
-
-    def add(total, part):
-        which, own = part
-        return jax.tree.map(jnp.add, total, jax.lax.switch(which, options, own)), None
-
-    # without any form, the function is a sum of sines
-    alone = (jnp.arange(MOST_PARTS) == 0).astype(int)
-    which = jnp.where(forms > 0, forms.astype(int) + 1, alone)
-    # in a loop, each form is compiled once instead of once per part
-    total, _ = jax.lax.scan(add, nothing(None), (which, _divided(numbers, forms)))
-    return total
-
-
-def _divided(numbers, forms) -> Float[Array, "m p"]:
-    """Return the parameters of each form, which follow one another in `numbers`."""
-    counts = jnp.array([0, *(one.count for one in PRIMITIVES)])[forms.astype(int)]
-    first = jnp.cumsum(counts) - counts
-    every = jnp.pad(jnp.stack(numbers), (0, MOST_NUMBERS))
-    return every[first[:, None] + jnp.arange(MOST_NUMBERS)[None]]
-
-
-@jax.jit
-def _interpolated(tables, place):
-    """Return the values of splines at a position in units of their knots."""
-    first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
-    u = place - first
-    first = first.astype(int)
-    weights = (
-        (1 - u) ** 3 / 6,
-        (3 * u**3 - 6 * u**2 + 4) / 6,
-        (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6,
-        u**3 / 6,
-    )
-
-    def along(table):
-        return sum(w * table[first + k] for k, w in enumerate(weights))
-
-    return jax.tree.map(along, tables)
-
-
 class FreeFunction(Term):
     """A function of any family, selected by the values of its arrays.
 
     It is a sum of sines if the first of `forms` is zero. Otherwise it is the sum of the
     forms that have these numbers in `PRIMITIVES`, counted from one, and the first
     coefficients are their parameters. All functions of one class share one compiled
-    program.
+    program. A function with a `gate` is a product of two forms, and has a program of
+    its own.
 
     **Arguments:** `label` of the parameters; `coefficients` of the sines and of a jump;
     `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
     `factors`, weights that select the argument and the factor; `middle`, `slip`;
     `stride`, the change of the argument in an integration step, over which derivatives
-    are averaged, or `None`.
+    are averaged, or `None`; `gate`, the second form of a product, whose parameters are
+    among the `coefficients` of the first (see `Gate`).
     """
 
     sentence: ClassVar[str] = "an unnamed function"
@@ -172,6 +77,8 @@ class FreeFunction(Term):
     forms: Float[Array, " m"] = eqx.field(default=(0.0,) * MOST_PARTS, converter=_array)
     odd: Float[Array, ""] = eqx.field(default=0.0, converter=_array)
     stride: Float[Array, ""] | None = None
+    # absent in saved systems without products
+    gate: "FreeFunction | None" = eqx.field(default=None, metadata={"spare": True})
     table: Float[Array, " n"] | None = None
     softened: Float[Array, " n"] | None = None
     jump: Float[Array, ""] | None = None
@@ -187,7 +94,7 @@ class FreeFunction(Term):
         integration step: otherwise the derivative with respect to the place of an edge
         is zero in most steps, and much too large in the others.
         """
-        tables, jump = _splines(
+        tables, jump = splines(
             self.coefficients,
             self.forms,
             (self.rates, self.shifts),
@@ -196,18 +103,27 @@ class FreeFunction(Term):
             self.stride,
         )
         return eqx.tree_at(
-            lambda f: (f.table, f.softened, f.jump),
+            lambda f: (f.table, f.softened, f.jump, f.gate),
             self,
-            (*tables, jump),
+            (*tables, jump, self._ready_gate()),
             is_leaf=lambda x: x is None,
         )
+
+    def _ready_gate(self):
+        """Return the second form of a product with its own parameters, or `None`."""
+        if self.gate is None:
+            return None
+        count = len(self.coefficients)
+        own = (jnp.ones(()), *(self.coefficients[k] for k in GATE_PLACES))
+        own += (jnp.zeros(()),) * (count - len(own))
+        return eqx.tree_at(lambda f: f.coefficients, self.gate, own).prepared()
 
     def exact(self):
         """Return the function with exact derivatives, not averaged over a step."""
         return eqx.tree_at(
-            lambda f: (f.stride, f.softened),
+            lambda f: (f.stride, f.softened, f.gate),
             self,
-            (None, None),
+            (None, None, None if self.gate is None else self.gate.exact()),
             is_leaf=lambda x: x is None,
         )
 
@@ -218,11 +134,13 @@ class FreeFunction(Term):
         label: str,
         coefficients,
         primitive: Primitive | None = None,
+        gate: Gate | None = None,
     ):
         """Return a member of a family with given coefficients of its sines and its
         jump.
 
-        With a `primitive`, the first coefficients are its parameters.
+        With a `primitive`, the first coefficients are its parameters; with a `gate`,
+        some of the others are those of the second form of a product.
         """
         rates, shifts = family.waves(len(coefficients) - 1)
 
@@ -252,6 +170,8 @@ class FreeFunction(Term):
             constraint=family.constraint,
             forms=_indices(primitive),
             odd=float(primitive is not None and primitive.odd),
+            gate=gate
+            and cls.of(gate.family, label, [0.0] * len(coefficients), gate.primitive),
         )
 
     def at(self, argument, direction: Any = 0.0):
@@ -271,13 +191,13 @@ class FreeFunction(Term):
         """Return the value of the spline with the derivatives of the softened one."""
         assert self.table is not None
         width = self.high - self.low
-        start, spacing = _knots(self.low, self.high)
-        more = jnp.where(self.forms[0] > 0, _BEYOND * width, 0.0)
+        start, spacing = knots_of(self.low, self.high)
+        more = jnp.where(self.forms[0] > 0, BEYOND * width, 0.0)
         inside = argument - self.low
         within = jnp.clip(inside, -more, width + more)
         inside = jnp.where(self.periodic, inside % width, within)
         place = (inside + self.low - start) / spacing
-        value, soft = _interpolated((self.table, self.softened), place)
+        value, soft = interpolated((self.table, self.softened), place)
         return value if soft is None else soft + jax.lax.stop_gradient(value - soft)
 
     def _argument(self, motion: Motion, speed):
@@ -310,6 +230,11 @@ class FreeForce(FreeFunction):
         deflection = motion.position - self.middle
         options = (1.0, motion.velocity, direction, deflection)
         factor = sum(w * option for w, option in zip(self.factors, options))
+        if self.gate is not None:
+            if self.gate.table is None:
+                return self.prepared().acceleration(motion)
+            across = self.gate._argument(motion, motion.velocity)
+            factor = factor * self.gate.at(across, direction)
         return self.at(argument, direction) * factor
 
 
