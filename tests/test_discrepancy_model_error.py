@@ -142,7 +142,7 @@ def test_terms_found_with_larger_noise_are_fitted_with_the_stated_one(question):
         trials.append(Trials(*every))
     first = trials[0].attempt(names, trials[0].attempt(frozenset(), None))
     bare = trials[1].attempt(frozenset(), None)
-    again = _again(trials[1], first)
+    again = _again(trials[1], first.names, first.fit)
     assert again.names == names and again.fit.cost < bare.fit.cost
     assert again.fit.point.states.shape == question.problem.start.states.shape
 

@@ -1,7 +1,5 @@
 """Caveats that qualify a verdict."""
 
-import dataclasses
-import enum
 from collections.abc import Iterator
 
 from ..evidence import (
@@ -16,47 +14,8 @@ from ..evidence import (
 )
 from ..policy import Policy
 from ..search import Question, Shuffled, Trial, Trials
+from ._caveat import Caveat, Reason
 from ._words import listed, number, percent, quantity, ratio, spelled
-
-
-class Reason(enum.StrEnum):
-    """The reason for a caveat, as a string."""
-
-    SMALL_REMAINDER = "small remainder"
-    IN_DOUBT = "in doubt"
-    MASKED = "masked by a corner"
-    IMITATING = "imitates what is missing"
-    NAMED_IN_DOUBT = "named in doubt"
-    FAR_FROM_DATA = "far from the data"
-    TIE = "tie"
-    DECOY = "a decoy explains much"
-    CHANCE = "no more than a knock-off"
-    NOT_SHARED = "not shared by the records"
-    DIFFERING = "a parameter differs"
-    POOR_PREDICTION = "poor prediction"
-    NOT_PREDICTIVE = "functions that do not predict"
-    ABOVE_NOISE = "above the noise"
-    BEYOND_TOLERANCE = "beyond tolerance"
-    NOISIER = "noisier than stated"
-    MODEL_ERROR = "errors of the model"
-    UNITS = "units in doubt"
-    TIME = "time is over"
-    SET_ASIDE = "record set aside"
-
-
-@dataclasses.dataclass(frozen=True)
-class Caveat:
-    """A caveat about a verdict."""
-
-    reason: Reason
-    """A `Reason`."""
-    sentence: str
-    """The caveat in words; `str` returns it as well."""
-    terms: tuple[str, ...] = ()
-    """Names of the terms concerned, if any."""
-
-    def __str__(self) -> str:
-        return self.sentence
 
 
 def caveats_of(
