@@ -145,14 +145,14 @@ def fitted(
         report("finding impacts and contacts", share)
 
     if isinstance(nominal, fitting.Setup):
-        nominal, runs = nominal.without_lags(runs)
+        nominal, moved = nominal.without_lags(runs)
         model, parameters = nominal.model, nominal.parameters
         if not parameters:
             raise ValueError(
                 "There is nothing to fit; state a `tolerance` for at least one entry "
                 "of [parameters] in the rig file."
             )
-        segments = nominal.segments(runs, progress=cutting)
+        segments = nominal.segments(moved, progress=cutting)
     else:
         model = fitting.cam_follower_model(nominal)
         parameters = fitting.cam_follower_parameters(nominal)

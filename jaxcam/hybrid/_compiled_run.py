@@ -41,13 +41,13 @@ class _Loop(NamedTuple):
     @staticmethod
     def of(system, plan, carried: LoopState) -> "_Loop":
         arrays, static = eqx.partition((system, plan), eqx.is_array)
-        sizes = [laid_out(part)[1].size for part in arrays]
+        of_system, of_plan = (laid_out(part)[1].size for part in arrays)
         _, shared = laid_out(arrays)
         _, nothing = laid_out(jax.tree.map(lambda _: None, arrays))
         numbers, lane = laid_out(carried)
         attempts = attempts_of(key_of(static, nothing, shared, carried, _row, 1))
         place = jax.tree.unflatten(lane.structure, range(len(numbers)))
-        return _Loop(attempts, *sizes, place)
+        return _Loop(attempts, of_system, of_plan, place)
 
 
 def _row(record, lane: LoopState):
