@@ -1,5 +1,6 @@
 """Errors of the sensor as free functions: what they are, and that they are found."""
 
+import dataclasses
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -201,5 +202,7 @@ def test_only_a_lag_of_two_samples_is_removed(unchecked_types):
         )
 
     assert long_lag(found(2.1e-3), [run]) == {"angle_rad": 2.1e-3}
+    coarser = dataclasses.replace(run, time=2 * run.time)
+    assert long_lag(found(2.1e-3), [run, coarser]) == {}
     assert long_lag(found(1.4e-3), [run]) == {}
     assert long_lag(found(None), [run]) == {}

@@ -3,12 +3,13 @@
 import math
 import textwrap
 
-import jax
 import numpy as np
 import pytest
 
 from jaxcam import fitting
 from jaxcam.data import NEW_RIG
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search import setup_question
 from jaxcam.fitting import Sensor, without_lags
 from jaxcam.models import ImpactOscillator
 from jaxcam.recordings import Recording, RecordingError, RigError
@@ -47,6 +48,10 @@ SYSTEM = """
 
         def impact(self, t, state):
             return jnp.zeros((0, 2))
+
+        @property
+        def period(self):
+            return 2 * jnp.pi / self.drive
 """
 STIFFNESS, LAG, GAIN = 41.0, 0.0213, 1.02
 
@@ -64,11 +69,16 @@ def recorded(seed: int) -> Recording:
 
 
 @pytest.fixture(scope="module")
-def setup(tmp_path_factory):
+def setup_file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("swing")
     (folder / "swing.py").write_text(textwrap.dedent(SYSTEM))
     (folder / "rig.toml").write_text(textwrap.dedent(RIG))
-    return fitting.read_setup(folder / "rig.toml")
+    return folder / "rig.toml"
+
+
+@pytest.fixture(scope="module")
+def setup(setup_file):
+    return fitting.read_setup(setup_file)
 
 
 def test_a_long_lag_is_fitted_exactly(setup):
@@ -84,15 +94,25 @@ def test_a_long_lag_is_fitted_exactly(setup):
     assert found.cost / found.problem.samples < 1.1
 
 
-def test_the_stated_calibration_reaches_the_sensor(setup):
+def test_the_stated_calibration_reaches_the_sensor(setup, setup_file):
     sensor = setup.model.sensors["position_m"]
     numbers = sensor.lag, sensor.gain, sensor.offset
     assert tuple(map(float, numbers)) == (0.018, 1.0, 0.5e-3)
     units = {one.name: one.unit for one in setup.parameters}
     assert units == {"stiffness": "1/s^2", "position_m.lag": "s", "position_m.gain": ""}
-    # the same names give the same programs
-    again = [jax.tree.structure(one) for one in (setup.model, setup.model)]
-    assert again[0] == again[1]
+    # a second reading selects the same fields, and needs no other program
+    again = fitting.read_setup(setup_file)
+    assert [p.where for p in again.parameters] == [p.where for p in setup.parameters]
+
+
+def test_a_calibration_that_the_rig_fits_is_no_missing_effect(setup):
+    """Otherwise two parameters would be the same number of the model."""
+    runs = (recorded(1), recorded(2))
+    question = setup_question(setup, runs, None, lambda *said: None, Policy(), {})
+    offered = {term.name for term in (*question.terms, *question.unlisted)}
+    assert offered.isdisjoint({"sensor_lag", "sensor_gain"})
+    assert "sensor_offset" in offered
+    assert {"position_m.lag", "position_m.gain"} <= {*question.rig}
 
 
 def test_samples_are_moved_by_whole_intervals():

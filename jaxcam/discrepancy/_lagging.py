@@ -7,8 +7,7 @@ is then wrong, and the error looks like further missing physics.
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from ..fitting import without_lags
 from ..recordings import Recording, Segments
 from .report import Diagnosis
 from .terms import SensorLag, watching
@@ -17,14 +16,17 @@ from .terms import SensorLag, watching
 def long_lag(
     found: Diagnosis, recordings: Sequence[Recording | Segments]
 ) -> dict[str, float]:
-    """Return the lag that a diagnosis has named (s), by its channel, if it is at least
-    two samples long and can be removed from the recordings; empty otherwise.
+    """Return the lag that a diagnosis has named (s), by its channel, if more of it can
+    be removed from the recordings than was removed before; empty otherwise.
     """
-    lag = _named(found)
-    if lag is None or any(isinstance(run, Segments) for run in recordings):
+    lag, model = _named(found), found.after.problem.model
+    whole = [run for run in recordings if isinstance(run, Recording)]
+    if lag is None or len(whole) < len(recordings):
         return {}
-    interval = float(np.mean([run.interval for run in recordings]))  # pyright: ignore
-    return {watching(found.after.problem.model): lag} if lag > 1.5 * interval else {}
+    channel = watching(model)
+    moved, _ = without_lags(model, whole, {channel: lag})
+    before, after = (one.sensors[channel].removed_lag for one in (model, moved))
+    return {channel: lag} if float(after) > float(before) else {}
 
 
 def more_accurate(again: Diagnosis, found: Diagnosis) -> bool:

@@ -269,7 +269,7 @@ class Policy:
     cause_worse: float = bounds(
         4.0, "multiple of the smallest misfit above which this series ends"
     )
-    cause_difference: float = bounds(1e-3, "relative step of its finite differences")
+    cause_difference: float = bounds(1e-3, "relative step of finite differences there")
     cause_fits: int = bounds(40, "maximum number of evaluations in that fit")
     trace_stride: float = bounds(
         0.1, "step in the trace of the monodromy matrix along a branch"
@@ -300,7 +300,8 @@ class Policy:
         0.5, "fraction of a function's gain that its decoy may reach without a caveat"
     )
     units_doubted: float = shows(
-        1000.0, "rms residual, in noises, above which a caveat doubts the units"
+        1000.0,
+        "rms residual, in units of the noise, above which a caveat doubts the units",
     )
     moved_errors: float = shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"

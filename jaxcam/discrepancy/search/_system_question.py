@@ -22,9 +22,11 @@ from ...recordings.files import check_channels, unit_of
 from ..policy import Policy
 from ..terms import (
     coordinates,
+    fitted_faults,
     library,
     Location,
     moves_surface,
+    SensorTerm,
     system_with_terms,
     Term,
     terms_of,
@@ -129,12 +131,14 @@ def system_question(
     references = dataclasses.replace(usual, **(stated or {}))
     clocked = turned or drive is not None
     profiled = turned and moves_surface(system, state)
+    # errors of the sensor that the rig fits itself are no missing effects
+    taken = fitted_faults(Model(system, dict(sensors), drive), seen, parameters)
 
     def listed(references: References):
         if candidates is None or isinstance(candidates, str):
             extended = candidates is not None
             usual = library(turned, references, clocked, extended, profiled)
-            offered = [location.of_library(term) for term in usual]
+            offered = [location.of_library(term) for term in _others(usual, taken)]
         else:
             offered = [location.reordered(term, len(pairs)) for term in candidates]
         scales = motion_scales(runs, seen, sensors[seen], references.slip_speed)
@@ -182,6 +186,15 @@ def system_question(
         relisted=relisted,
         **_drives(recordings, drive_channel),
     )
+
+
+def _others(terms: Sequence[Term], taken: set[str]) -> list[Term]:
+    """Return the terms that do not act on the `taken` fields of a sensor."""
+    return [
+        term
+        for term in terms
+        if not (isinstance(term, SensorTerm) and taken & set(term.fields))
+    ]
 
 
 def _drives(recordings: Sequence[Segments], channel: str | None) -> dict[str, Any]:

@@ -47,6 +47,7 @@ from ._primitives import (
 from ._products import Gate as Gate, GATE_PLACES as GATE_PLACES
 from ._scaled import ScaledTerm as ScaledTerm
 from ._sensed import (
+    fitted_faults as fitted_faults,
     more_faults as more_faults,
     own_faults as own_faults,
     watched as watched,

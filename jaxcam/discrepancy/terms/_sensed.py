@@ -41,6 +41,18 @@ def more_faults(model: Model, parameters: Sequence[Parameter]) -> list[Parameter
     ]
 
 
+def fitted_faults(
+    model: Model, channel: str, parameters: Sequence[Parameter]
+) -> set[str]:
+    """Return which of the gain, offset and lag of a sensor are parameters."""
+    sensor, found = model.sensors[channel], [one.where(model) for one in parameters]
+    return {
+        field
+        for field in _FAULTS
+        if any(one is getattr(sensor, field) for one in found)
+    }
+
+
 def own_faults(model: Model, parameters: Sequence[Parameter]) -> list[str]:
     """Return the names of the parameters that are the gain, offset or lag of the first
     coordinate's sensor.
