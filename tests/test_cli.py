@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import typer
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -22,6 +23,7 @@ import jaxcam as package
 from jaxcam import _xla_log, discrepancy
 from jaxcam.cli import app
 from jaxcam.cli._cache import keep_compiled_programs
+from jaxcam.cli._errors import one_sentence
 from jaxcam.cli._output import to_text
 from jaxcam.cli._parameters import assign_parameters, parameters
 from jaxcam.cli._source import make_system
@@ -155,6 +157,23 @@ def test_interrupted_run_says_so(monkeypatch):
         found.stderr
         == "Stopped by Ctrl-C before the end; run the command again to finish.\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [
+        (None, "run the command again to finish."),
+        (Path("DIR"), "add --resume to go on from what is stored."),
+    ],
+)
+def test_interrupted_command_says_how_to_go_on(out, words, capsys):
+    @one_sentence
+    def command(*, out, resume):
+        raise KeyboardInterrupt
+
+    with pytest.raises(typer.Exit):
+        command(out=out, resume=False)
+    assert capsys.readouterr().err.endswith(words + "\n")
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,15 @@
 """A restitution law whose reference speed the rig file does not state."""
 
+import dataclasses
+from typing import NamedTuple
+
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 from jaxcam import HybridSystem
+from jaxcam.cli._restitution_figure import restitution
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
 from jaxcam.discrepancy.search import (
     Search,
@@ -12,7 +17,8 @@ from jaxcam.discrepancy.search import (
     Trials,
     with_fitted_speed,
 )
-from jaxcam.fitting import Model, Parameter, segment_by_model, Sensor
+from jaxcam.discrepancy.terms import system_with_terms
+from jaxcam.fitting import Fit, fit, Model, Parameter, Problem, segment_by_model, Sensor
 from jaxcam.recordings import Recording
 
 
@@ -61,6 +67,46 @@ def drops():
         noisy = _height(time, height) + _NOISE * rng.standard_normal(len(time))
         runs.append(Recording(f"drop{k}", time, {"height_m": noisy}))
     return segment_by_model(Model(Ball(), _SENSORS), runs, _PARAMETERS)
+
+
+class _Found(NamedTuple):
+    """The fits of a diagnosis, as its figure of the law needs them."""
+
+    before: Fit
+    after: Fit
+
+    def system(self):
+        return self.after.model().system
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_the_law_is_drawn_over_the_approach_speeds(drops):
+    """The curve is r0 (1 + v/2)^-rb with the fitted numbers (1e-12), its band twice
+    the standard error of that expression (1e-6); the textbook curve is constant."""
+    (term,) = (one for one in library() if one.name == "restitution_velocity")
+    term = dataclasses.replace(term, reference=jnp.asarray(2.0))
+    rb = Parameter("rb", lambda m: m.system.terms[0].rb, 0.5)
+    r0 = Parameter("restitution", lambda m: m.system.base.restitution, 0.15)
+    law = Model(system_with_terms(Ball(), (term,)), _SENSORS)
+    before = fit(Problem.build(Model(Ball(), _SENSORS), drops, _PARAMETERS))
+    after = fit(Problem.build(law, drops, (r0, rb)))
+    figure = restitution(plt, _Found(before, after))
+    (axis,) = figure.axes
+    textbook, curve, impacts = axis.lines
+    speed = curve.get_xdata()
+    values = {one.name: one.value for one in after.estimates}
+    expected = values["restitution"] * (1 + speed / 2.0) ** -values["rb"]
+    np.testing.assert_allclose(curve.get_ydata(), expected, rtol=1e-12)
+    assert np.ptp(textbook.get_ydata()) < 1e-12
+    assert len(impacts.get_xdata()) == sum(part.impacts.count for part in drops)
+    names = [one.name for one in after.estimates]
+    push = np.zeros((len(speed), 2))
+    push[:, names.index("restitution")] = expected / values["restitution"]
+    push[:, names.index("rb")] = -expected * np.log1p(speed / 2.0)
+    error = np.sqrt(np.einsum("kp,pq,kq->k", push, after.covariance, push))
+    edges = axis.collections[1].get_paths()[0].vertices[:, 1]
+    assert np.max(edges) == pytest.approx(np.max(expected + 2 * error), rel=1e-6)
+    plt.close(figure)
 
 
 @pytest.mark.slow

@@ -12,7 +12,8 @@ from ..discrepancy.terms import Relaxation, unit_along
 from ..fitting import Residuals
 from ._changed import changed
 from ._ranking_figure import RANKING, ranking
-from ._residual_axes import Along, residual_label, shown_in, title_of
+from ._residual_axes import Along, residual_label, shown_in, sides, title_of
+from ._restitution_figure import has_law, RESTITUTION, restitution
 from ._shapes_figure import caption, shapes
 
 
@@ -34,11 +35,14 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
     maps = maps.format(Along(found.unseen[0]).word)
     with style():
         missing = folder / "missing.png"
-        nameless = []
+        functions = []
         if found.missing:
-            nameless = [(save_figure(_missing(plt, found), missing), _MISSING)]
+            functions.append((save_figure(_missing(plt, found), missing), _MISSING))
+        if has_law(found):
+            law = save_figure(restitution(plt, found), folder / "restitution.png")
+            functions.append((law, RESTITUTION))
         return [
-            *nameless,
+            *functions,
             (save_figure(_unseen(plt, found), folder / "unseen.png"), unseen),
             (save_figure(_maps(plt, found), folder / "maps.png"), maps),
             (save_figure(shapes(plt, found), folder / "shapes.png"), caption(found)),
@@ -92,7 +96,7 @@ def _unseen(plt, found: Diagnosis):
     both = max(zip(before, after), key=_improvement)
     factor, _ = shown_in(both[0])
     for axis, part, label in zip(axes, both, labels):
-        for resting in _sides(both):
+        for resting in sides(both):
             keep = part.resting == resting
             axis.plot(
                 part.time[keep],
@@ -123,22 +127,22 @@ def _maps(plt, found: Diagnosis):
     from scipy.stats import norm
 
     every = found.unseen[0]
-    along, sides = Along(every), _sides(every)
+    along, shown = Along(every), sides(every)
     sets = (", before", ", after") if changed(found) else ("",)
     figure, axes = plt.subplots(
-        len(sides),
+        len(shown),
         len(sets),
-        figsize=(8.5, 0.6 + 2.2 * len(sides)),
+        figsize=(8.5, 0.6 + 2.2 * len(shown)),
         sharex=True,
         sharey=True,
         layout="constrained",
         squeeze=False,
     )
     names = list(dict.fromkeys(title_of(part, every) for part in every))
-    end = float(norm.isf(0.005 / (_BINS * len(names) * len(sides))))
+    end = float(norm.isf(0.005 / (_BINS * len(names) * len(shown))))
     image = None
     for column, parts, which in zip(axes.T, found.unseen, sets):
-        for axis, resting in zip(column, sides):
+        for axis, resting in zip(column, shown):
             rows = [
                 _binned(
                     [p for p in parts if title_of(p, every) == name], resting, along
@@ -163,13 +167,6 @@ def _maps(plt, found: Diagnosis):
         image, ax=axes, label="mean residual\n(standard errors)", extend="both"
     )
     return figure
-
-
-def _sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
-    """Return the values of `resting` for which residuals are drawn: `False` (flight),
-    and `True` (contact) if there is any contact.
-    """
-    return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
 
 
 def _binned(parts: Sequence[Residuals], resting: bool, along: Along):

@@ -1,7 +1,7 @@
 """Convert exceptions to one sentence on standard error and an exit code."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ParamSpec, TypeVar
 
 import typer
@@ -43,7 +43,7 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
         try:
             return command(*args, **kwargs)
         except KeyboardInterrupt:
-            fail("Stopped by Ctrl-C before the end; run the command again to finish.")
+            fail(_interrupted(kwargs))
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
             # the program that reads the output has ended (jaxcam ... | head)
@@ -58,6 +58,15 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
             release()
 
     return wrapper
+
+
+def _interrupted(options: Mapping[str, object]) -> str:
+    """Return how to finish an interrupted command, given its options."""
+    if "resume" in options and options.get("out") is not None:
+        again = "add --resume to go on from what is stored"
+    else:
+        again = "run the command again to finish"
+    return f"Stopped by Ctrl-C before the end; {again}."
 
 
 def fail(message: str) -> None:

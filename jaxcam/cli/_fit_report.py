@@ -10,7 +10,7 @@ matplotlib.use("Agg")
 
 from ..fitting import Bootstrap, Fit, Problem, residuals
 from ..plotting.colours import CONTACT, FLIGHT
-from ._residual_axes import Along, residual_label, shown_in, title_of
+from ._residual_axes import Along, residual_label, shown_in, sides, title_of
 
 
 def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Table:
@@ -86,18 +86,15 @@ def _draw(plt, save_figure, folder, before, after) -> list[Path]:
             factor, _ = shown_in(both[0])
             for axis, part, when in zip(row, both, ("nominal", "fitted")):
                 x = along.place(part) if sideways else part.time
-                for resting, color, label in (
-                    (False, FLIGHT, "flight"),
-                    (True, CONTACT, "contact"),
-                ):
+                for resting in sides(every):
                     keep = part.resting == resting
                     axis.plot(
                         x[keep],
                         part.value[keep] * factor,
                         ".",
                         ms=1,
-                        color=color,
-                        label=label,
+                        color=CONTACT if resting else FLIGHT,
+                        label="contact" if resting else "flight",
                         rasterized=True,
                     )
                 band = 2 * factor * part.noise

@@ -32,6 +32,13 @@ def title_of(part: Residuals, parts: Sequence[Residuals]) -> str:
     return f"{part.record}, {part.channel}" if several else part.record
 
 
+def sides(parts: Sequence[Residuals]) -> tuple[bool, ...]:
+    """Return the values of `resting` for which residuals are drawn: `False` (flight),
+    and `True` (contact) if there is any contact.
+    """
+    return (False, True) if any(np.any(part.resting) for part in parts) else (False,)
+
+
 class Along:
     """The horizontal axis of residual plots: drive angle, or time without a drive."""
 

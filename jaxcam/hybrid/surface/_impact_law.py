@@ -19,7 +19,9 @@ _KNOWN = 1e7
 _STEPS = 4
 
 
-def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array, " m"]:
+def restitutions(
+    system: HybridSystem, t, x: Float[Array, " n"], approach=None
+) -> Float[Array, " m"]:
     """Return the coefficient of restitution of each constraint near a state.
 
     The state is moved onto the constraint, and its normal velocity is made negative:
@@ -27,6 +29,13 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
     impact (thesis, eq. 2.27). For a state at rest on the constraint, the normal
     velocity is only rounding error, so it is replaced by a larger value, or by 1 if it
     is exactly zero and has no rounding error.
+
+    Args:
+        system: The system.
+        t: Time.
+        x: State, shape `(n,)`.
+        approach: Approach speed of the impacts, positive; by default the speed of the
+            state.
     """
     number = gaps(system, t, x).shape[0]
     found = []
@@ -42,7 +51,7 @@ def restitutions(system: HybridSystem, t, x: Float[Array, " n"]) -> Float[Array,
         value, slope = jax.value_and_grad(speed)(y)
         rounding = speed_rounding(system, t, y, jnp.abs(y))[k]
         size = jnp.maximum(jnp.abs(value), _KNOWN * rounding)
-        wanted = -jnp.where(size == 0, 1.0, size)
+        wanted = -jnp.where(size == 0, 1.0, size) if approach is None else -approach
         y = y + (wanted - value) * slope / jnp.sum(slope * slope)
         found.append(-speed(impacts(system, t, y)[k]) / speed(y))
     return jnp.stack(found) if found else jnp.zeros((0,))

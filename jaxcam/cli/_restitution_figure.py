@@ -1,0 +1,115 @@
+"""The figure of a diagnosis that shows the coefficient of restitution as a law."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ..discrepancy import Diagnosis
+from ..discrepancy.terms import Where
+from ..fitting import Fit
+from ..hybrid.surface import restitutions
+from ..plotting.colours import IMPACT
+from ..plotting.labels import labelled
+from ..recordings.files import unit_of
+
+
+RESTITUTION = (
+    "Coefficient of restitution against approach speed: the textbook model, refitted "
+    "(dashed), and the model with the missing effects (line), each with a band of "
+    "twice the standard error. The marks at the bottom are the approach speeds of the "
+    "recorded impacts; outside them, the law is extrapolated."
+)
+
+_SPEEDS = 60
+_TEXTBOOK = "0.45"
+
+
+class _Law(NamedTuple):
+    """Coefficients of all gaps at some approach speeds, shape `(speeds, gaps)`."""
+
+    value: Float[np.ndarray, "k m"]
+    stderr: Float[np.ndarray, "k m"]
+
+
+def has_law(found: Diagnosis) -> bool:
+    """Return whether a missing effect changes impacts that were measured."""
+    changes = any(effect.where == Where.IMPACT for effect in found.effects)
+    return changes and bool(len(_speeds(found)))
+
+
+def restitution(plt, found: Diagnosis):
+    """Return the figure, with one panel per gap whose coefficient depends on the
+    approach speed; with all gaps if there is none.
+    """
+    recorded = _speeds(found)
+    fastest = max(np.max(speeds) for speeds in recorded.values())
+    along = np.linspace(0, 1.02 * fastest, _SPEEDS + 1)[1:]
+    laws = (_law(found.before, along), _law(found.after, along))
+    varies = np.ptp(laws[1].value, axis=0) > np.max(laws[1].stderr, axis=0)
+    shown = [gap for gap in recorded if varies[gap]] or list(recorded)
+    figure, axes = plt.subplots(
+        1, len(shown), figsize=(max(5.0, 3.8 * len(shown)), 3.2),
+        layout="constrained", squeeze=False,
+    )  # fmt: skip
+    segments = found.after.problem.segments
+    unit = unit_of(segments[0].channel)
+    name = found.system().constraint_name
+    for axis, gap in zip(axes.flat, shown):
+        for law, color, line, label in zip(
+            laws,
+            (_TEXTBOOK, IMPACT),
+            ("--", "-"),
+            ("textbook model", "with the missing effects"),
+        ):
+            value, band = law.value[:, gap], 2 * law.stderr[:, gap]
+            axis.fill_between(
+                along, value - band, value + band, color=color, alpha=0.25, lw=0
+            )
+            axis.plot(along, value, line, color=color, label=label)
+        axis.plot(
+            recorded[gap], np.zeros_like(recorded[gap]), "|", color="k", ms=9,
+            alpha=0.4, transform=axis.get_xaxis_transform(), label="recorded impacts",
+        )  # fmt: skip
+        axis.set_xlim(0, 1.02 * np.max(recorded[gap]))
+        axis.set_xlabel(labelled("approach speed", f"{unit}/s" if unit else ""))
+        if len(recorded) > 1:
+            axis.set_title(name(gap))
+    axes[0, 0].set_ylabel("coefficient of restitution")
+    axes[0, 0].legend(fontsize="small")
+    return figure
+
+
+def _speeds(found: Diagnosis) -> dict[int, Float[np.ndarray, " k"]]:
+    """Return the approach speeds of the recorded impacts at each gap that has any."""
+    impacts = [part.impacts for part in found.after.problem.segments]
+    side = np.concatenate([one.side for one in impacts])
+    speed = np.concatenate([one.approach for one in impacts])
+    known = np.isfinite(speed) & (speed > 0)
+    return {int(gap): speed[known & (side == gap)] for gap in np.unique(side[known])}
+
+
+def _law(fit: Fit, along: Float[np.ndarray, " k"]) -> _Law:
+    """Return the coefficients of a fitted model, as in its first recording."""
+    drive = fit.problem.segments[0].drive
+
+    def law(values, layout, state):
+        model = layout.at(values)
+        system = model.system if drive is None else model.uniform(0.0, drive.speed)
+        zero = jnp.zeros(())
+        return jax.vmap(lambda one: restitutions(system, zero, state, one))(along)
+
+    given = fit.point.values[0], fit.problem.layout, fit.point.states[0, 0]
+    value = eqx.filter_jit(law)(*given)
+    slopes = eqx.filter_jit(eqx.filter_jacfwd(law))(*given)
+    own = fit.problem.records[0]
+    rows = [k for k, one in enumerate(fit.estimates) if one.record in (None, own)]
+    names = [one.name for one in fit.problem.parameters]
+    columns = [names.index(fit.estimates[k].name) for k in rows]
+    covariance = fit.covariance[np.ix_(rows, rows)]
+    push = np.asarray(slopes)[..., columns]
+    variance = np.einsum("kmp,pq,kmq->km", push, covariance, push)
+    return _Law(np.asarray(value), np.sqrt(np.maximum(variance, 0.0)))
