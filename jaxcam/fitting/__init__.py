@@ -30,6 +30,7 @@ from ._setup import Setup as Setup
 from .engine import (
     Input as Input,
     Model as Model,
+    Output as Output,
     Parameter as Parameter,
     Problem as Problem,
     Sensor as Sensor,

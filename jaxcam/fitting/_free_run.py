@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -34,13 +35,11 @@ from .engine import (
 # Maximum number of Gauss-Newton steps for the initial state, and the relative decrease
 # of the cost below which the iteration ends
 _NEWTON, _STILL = 20, 1e-12
-# Regularisation of the initial state, relative to the information in the data: it keeps
-# an unobserved component unchanged
+# Relative regularisation: it keeps an unobserved component of the initial state
 _LEAST = 1e-12
 # Integration steps between two samples: initial and maximum number
 _FIRST_STEPS, _MOST_STEPS = 2, 64
-# Allowed change of the simulated motion when the steps are halved, in standard
-# deviations of the noise or relative to the motion
+# Allowed change when the steps are halved: standard deviations, or relative to motion
 _OF_NOISE, _OF_MOTION = 0.1, 1e-6
 # Change, relative to the motion, above which the largest number of steps is too small
 _TOO_FAR = 1e-2
@@ -240,13 +239,14 @@ def simulated(model: Model, one: Prepared) -> Simulated:
     size = one.state.shape[0] - len(filtered_channels(model))
 
     def seen(t, system, x, field, events: Any = 0):
-        values = []
+        values, along = [], (jnp.ones_like(t), field[:size])
         for name, sensor in model.sensors.items():
             if sensor.filtered:
                 place = size + filtered_channels(model).index(name)
                 value, slope = x[place], field[place]
             else:
-                value, slope = jax.jvp(sensor.seen, (x[:size],), (field[:size],))
+                read = partial(sensor.seen, system)
+                value, slope = jax.jvp(read, (t, x[:size]), along)
             lag = sensor.lag - sensor.removed_lag
             values.append(sensor.offset + sensor.gain * (value - lag * slope))
         gap = jnp.min(gaps(system, t, x[:size]), initial=jnp.inf)
@@ -303,9 +303,9 @@ def _started(model: Model, one: Prepared) -> Prepared:
         if not now < cost * (1 - _STILL):
             break
         cost = now
-        # scale the columns to unit length; an unobserved component is not changed
+        # columns of unit length; an unobserved component is not changed
         scale = np.linalg.norm(rows, axis=0)
-        scale = np.where(scale > 0, scale, 1.0)
+        scale[scale == 0] = 1.0
         state = state - np.linalg.lstsq(rows / scale, missed, rcond=None)[0] / scale
     return dataclasses.replace(one, state=jnp.asarray(state))
 

@@ -3,14 +3,15 @@
 import dataclasses
 from pathlib import Path
 
-from ..hybrid import HybridSystem
+from ..hybrid import HybridSystem, SwitchedSystem
 from ..recordings import RigError
-from ..recordings.files import known_keys, Section, si, unit_of
+from ..recordings.files import known_keys, printable, Section, si, unit_of
 from ._stated import Stated, stated
-from .engine import Model, Parameter, Sensor
+from .engine import Model, Output, Parameter, Sensor
 
 
 _CALIBRATION = ("gain", "offset", "lag")
+_RATE = "rate of "
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +57,7 @@ def _sensor(
     if not isinstance(outer.table[name], dict):
         raise outer.error(name, "is not a table with `sees` and `noise`")
     section = Section(outer.file, name, outer.table, outer.name)
-    seen = section.choice("sees", *system.state_names)
+    observe = _observed(section, system)
     unit = unit_of(name) or None
     noise = section.positive("noise", unit)
     units = {"resolution": unit, "limit": unit, "bandwidth_hz": "Hz", "tails": ""}
@@ -69,9 +70,8 @@ def _sensor(
     keys = ("sees", "noise", *units, *_CALIBRATION)
     known_keys(section.file, section.name, section.table, keys)
     _check(section, calibrated)
-    place = system.state_names.index(seen)
     values = {key: one.value for key, one in calibrated.items()}
-    sensor = Sensor(place, noise, **options, **values)  # pyright: ignore
+    sensor = Sensor(observe, noise, **options, **values)  # pyright: ignore
     own_units = {"gain": "", "offset": unit or "", "lag": "s"}
     parameters = [
         one.parameter(f"{name}.{key}", SensorField(name, key), own_units[key])
@@ -79,6 +79,25 @@ def _sensor(
         if one.tolerance > 0
     ]
     return sensor, parameters
+
+
+def _observed(section: Section, system: HybridSystem) -> int | Output:
+    """Return the state component that a channel measures, or the output."""
+    seen, names = section.word("sees"), system.state_names
+    if seen in names:
+        return names.index(seen)
+    if seen.removeprefix(_RATE) in names:
+        return Output(names.index(seen.removeprefix(_RATE)))
+    own = getattr(type(system), seen, None)
+    if callable(own) and not hasattr(SwitchedSystem, seen):
+        return Output(seen)
+    quoted = " or ".join(f'"{name}"' for name in names)
+    raise section.error(
+        "sees",
+        f'is "{printable(seen)}", but must be {quoted}; or "{_RATE}{names[-1]}", as an '
+        f"accelerometer sees; or the name of a method `(t, state, rate)` of "
+        f"{type(system).__name__}",
+    )
 
 
 def _check(section: Section, calibrated: dict[str, Stated]) -> None:

@@ -11,7 +11,6 @@ from jaxtyping import Float
 
 from ..hybrid.programs import program
 from ..recordings import Recording, RecordingError, segment
-from ..recordings.against_model import size_of
 from ..recordings.cut import (
     Drive,
     padded,
@@ -28,6 +27,7 @@ from .engine import (
     Model,
     Parameter,
     parameter_places,
+    state_size,
     with_constants,
 )
 
@@ -162,7 +162,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
 
 def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
     """Return the state at each sample; components that are not measured are zero."""
-    size = size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
+    size = state_size(model)
     states = np.zeros((len(recording), size))
     for place, name in picks.items():
         sensor = model.sensors[name]

@@ -137,7 +137,7 @@ def record(
     count = round(duration / interval)
     time = interval * np.arange(count)
     channels = {
-        channel: _sense(sensor, trajectory, settle, count, interval, rng)
+        channel: _sense(sensor, system, trajectory, settle, count, interval, rng)
         for channel, sensor in sensors.items()
     }
     speed = None
@@ -151,13 +151,16 @@ def record(
     return Recording(name, time, channels, speed)
 
 
-def _sense(sensor, trajectory, settle, count, interval, rng) -> Float[np.ndarray, " k"]:
+def _sense(
+    sensor, system, trajectory, settle, count, interval, rng
+) -> Float[np.ndarray, " k"]:
     filtered = sensor.bandwidth_hz != float("inf")
     finer = _FINER if filtered else 1
     fine = interval / finer
     times = settle + fine * np.arange(count * finer) - float(sensor.lag)
     states = np.asarray(trajectory.at(np.maximum(times, trajectory.t0)))
-    seen = np.asarray(jax.vmap(sensor.seen)(jnp.asarray(states)))
+    read = jax.vmap(lambda t, x: sensor.seen(system, t, x))
+    seen = np.asarray(read(jnp.asarray(times), jnp.asarray(states)))
     if filtered:
         seen = _filtered(seen, 2 * np.pi * sensor.bandwidth_hz * fine)
     seen = float(sensor.offset) + float(sensor.gain) * seen[::finer]

@@ -1,7 +1,7 @@
 """The model to fit: a system, its drive and its sensors."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid import HybridSystem
+from ._output import Output
 
 
 def _array(value) -> Array:
@@ -17,6 +18,11 @@ def _array(value) -> Array:
 
 def _number(default: float):
     return eqx.field(default=default, converter=_array)
+
+
+def _sorted(sensors: Mapping[str, Any]) -> dict[str, Any]:
+    # as JAX sorts a dictionary, so that the channels have the same order everywhere
+    return dict(sorted(sensors.items()))
 
 
 class Sensor(eqx.Module):
@@ -35,8 +41,8 @@ class Sensor(eqx.Module):
         0.003014
     """
 
-    observe: int | Callable[[Array], Array] = eqx.field(static=True)
-    """Index of a state component, or a function of the state."""
+    observe: int | Output | Callable[[Array], Array] = eqx.field(static=True)
+    """Index of a state component, a function of the state, or an `Output`."""
     noise: Float[Array, ""] = eqx.field(converter=_array)
     """Standard deviation of the noise, in the units of the channel."""
     resolution: float = eqx.field(default=0.0, static=True)
@@ -84,12 +90,21 @@ class Sensor(eqx.Module):
     def filtered(self) -> bool:
         return self.bandwidth_hz != float("inf")
 
-    def seen(self, state: Float[Array, " n"]) -> Array:
+    @property
+    def in_flight_only(self) -> bool:
+        """Whether the channel says nothing about the motion in contact: the state of a
+        filter is not known there, and the contact force is not part of an output.
+        """
+        return self.filtered or isinstance(self.observe, Output)
+
+    def seen(self, system: HybridSystem, t, state: Float[Array, " n"]) -> Array:
         """Return the measured quantity for a state, before gain and offset are
         applied.
         """
         if isinstance(self.observe, int):
             return state[self.observe]
+        if isinstance(self.observe, Output):
+            return self.observe(system, t, state)
         return jnp.asarray(self.observe(state))
 
 
@@ -197,8 +212,8 @@ class Model(eqx.Module):
 
     system: HybridSystem
     """Any `HybridSystem`."""
-    sensors: Mapping[str, Sensor]
-    """A `Sensor` for each fitted channel."""
+    sensors: Mapping[str, Sensor] = eqx.field(converter=_sorted)
+    """A `Sensor` for each fitted channel, in alphabetical order."""
     drive: Turning | Input | None = None
     """The measured drive or input of the system, if there is one."""
 
@@ -259,6 +274,15 @@ def filtered_channels(model: Model) -> tuple[str, ...]:
     return tuple(name for name in model.sensors if model.sensors[name].filtered)
 
 
+def state_channels(model: Model) -> dict[str, int | Callable[[Array], Array]]:
+    """Return the channels that depend on the state alone, and how."""
+    return {
+        name: sensor.observe
+        for name, sensor in model.sensors.items()
+        if not isinstance(sensor.observe, Output)
+    }
+
+
 def augmented_field(model: Model, system, t, state):
     """Return the rate of change of the system state and of the sensor filters."""
     lags = filtered_channels(model)
@@ -268,5 +292,5 @@ def augmented_field(model: Model, system, t, state):
     for place, name in enumerate(lags):
         sensor = model.sensors[name]
         corner = 2 * jnp.pi * sensor.bandwidth_hz
-        rates.append((corner * (sensor.seen(x) - state[size + place]))[None])
+        rates.append((corner * (sensor.seen(system, t, x) - state[size + place]))[None])
     return jnp.concatenate(rates)

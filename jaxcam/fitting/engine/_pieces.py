@@ -185,12 +185,14 @@ def gather(
     measured: str | None = None,
     curved: Sequence[str] | None = None,
     rests: bool = True,
+    in_flight_only: Sequence[str] = (),
 ) -> tuple[Pieces, list[tuple[list[Span], list[Span]]]]:
     """Gather the pieces of all recordings, padded so that similar recordings share a
     compiled program.
 
     **Arguments:** `measured` is the channel of an input, in place of a drive; `curved`
-    and `rests` are those of `spans`.
+    and `rests` are those of `spans`; the samples of the channels `in_flight_only` are
+    not used in contact.
 
     **Raises:** `RecordingError` if there is nothing to fit.
     """
@@ -218,6 +220,7 @@ def gather(
     flown, rested = (
         Samples(*(np.stack(column) for column in zip(*rows))) for rows in both
     )
+    rested.known[..., [name in in_flight_only for name in channels]] = False
     records = len(segments)
     joint = np.zeros((records, width), dtype=int)
     exists = np.zeros((records, width), dtype=bool)

@@ -12,23 +12,12 @@ from ...hybrid.surface import gaps, impacts
 from ._constant import constant
 from ._model import augmented_field, DriveState, filtered_channels, Model
 from ._modes import on_side_of
+from ._readings import Nodes, readings
 from ._switched_steps import switched_end, switched_nodes
 
 
 # Steps of Newton's method
 _NEWTON = 4
-
-
-class Nodes(NamedTuple):
-    """Values and rates of the channels at both ends of each step.
-
-    Gain, offset and lag of the sensors are not yet applied.
-    """
-
-    left: Float[Array, "n c"]
-    right: Float[Array, "n c"]
-    left_rate: Float[Array, "n c"]
-    right_rate: Float[Array, "n c"]
 
 
 def fly(model: Model, state, start, step, drive: DriveState, substeps: Any = 1):
@@ -50,8 +39,7 @@ def fly(model: Model, state, start, step, drive: DriveState, substeps: Any = 1):
                 coarse + jax.lax.stop_gradient(better - coarse)
                 for better, coarse in zip(fine, (states, fields))
             )
-    values, rates = jax.vmap(lambda x, f: _raw(model, x, f))(states, fields)
-    return states[-1], Nodes(values[:-1], values[1:], rates[:-1], rates[1:])
+    return states[-1], readings(model, states, fields, start, step, drive)
 
 
 def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps):
@@ -123,11 +111,21 @@ def rest(model: Model, guess, start, step, drive: DriveState):
     surface.
     """
 
-    def seen(x):
-        return jnp.stack([s.seen(x) for s in model.sensors.values()])
-
     def channel(t, here):
-        return jax.jvp(seen, *contact_state(model.driven(t, here), t, guess))
+        system = model.driven(t, here)
+
+        def seen(x):
+            # channels without data in contact are arbitrary here
+            return jnp.stack(
+                [
+                    jnp.zeros_like(t)
+                    if sensor.in_flight_only
+                    else sensor.seen(system, t, x)
+                    for sensor in model.sensors.values()
+                ]
+            )
+
+        return jax.jvp(seen, *contact_state(system, t, guess))
 
     times = start + step * jnp.arange(drive.angle.shape[0], dtype=float)
     values, rates = jax.vmap(channel)(times, drive)
@@ -338,19 +336,3 @@ def smallest_gap(system: HybridSystem, t, x) -> Float[Array, ""]:
     for other in others:
         first = jnp.where(other < first, other, first)
     return first
-
-
-def _raw(model: Model, state, field):
-    """Return channels and their rates, before gain, offset and lag, shapes `(c,)`."""
-    lags = filtered_channels(model)
-    size = state.shape[0] - len(lags)
-    values, rates = [], []
-    for name, sensor in model.sensors.items():
-        if sensor.filtered:
-            place = size + lags.index(name)
-            value, slope = state[place], field[place]
-        else:
-            value, slope = jax.jvp(sensor.seen, (state[:size],), (field[:size],))
-        values.append(value)
-        rates.append(slope)
-    return jnp.stack(values), jnp.stack(rates)

@@ -69,6 +69,7 @@ from ._problem_checks import (
     refuse_hysteresis,
     refuse_not_finite,
     refuse_repeated,
+    refuse_switched_outputs,
 )
 from ._sharpness import joint_sharpness
 from ._starts import state_size, suggested_starts
@@ -168,6 +169,7 @@ class Problem:
         constants = known_constants(model, [part.recording for part in segments])
         parameters = (*parameters, *constants)
         refuse_hysteresis(model)
+        refuse_switched_outputs(model)
         refuse_repeated(parameters)
         layout = Layout(model, parameter_places(model, parameters))
         nominal = np.array([float(p.where(model)) for p in parameters])
@@ -177,15 +179,17 @@ class Problem:
                 values[:, column] = one.known
         measured = model.drive.channel if isinstance(model.drive, Input) else None
         steps = _STEPS
-        # filtered channels are smooth even where the motion is not, so they cannot show
-        # how short the pieces must be
-        curved = [name for name in model.sensors if not model.sensors[name].filtered]
+        # filtered channels are smooth even where the motion is not, and outputs are
+        # noisy, so they do not show how short the pieces must be
+        sensors = model.sensors
+        flying = [name for name in sensors if sensors[name].in_flight_only]
+        curved = [name for name in sensors if name not in flying]
         # with several coordinates, a contact does not show which of them are at rest,
         # so contacts are used only for a single coordinate
         rests = state_size(model) <= 2
         while True:
             pieces, cuts = gather(
-                segments, tuple(model.sensors), steps, measured, curved, rests
+                segments, tuple(sensors), steps, measured, curved, rests, flying
             )
             needed = steps_for_inputs(model, segments, pieces, steps)
             if needed > steps and steps < _MOST_STEPS:

@@ -9,6 +9,7 @@ from ...hybrid.programs import program
 from ._layout import Layout
 from ._linearise import Point
 from ._model import augmented_field, Model
+from ._output import Output
 from ._pieces import Pieces
 
 
@@ -53,6 +54,18 @@ def refuse_hysteresis(model: Model) -> None:
             "begins. Fit such a system with `jaxcam.simulate`, or set `hysteresis` to "
             "zero."
         )
+
+
+def refuse_switched_outputs(model: Model) -> None:
+    """Raise `ValueError` for a sensor of the rate of change of a system with modes."""
+    if not isinstance(model.system, SwitchedSystem):
+        return
+    for name, sensor in model.sensors.items():
+        if isinstance(sensor.observe, Output):
+            raise ValueError(
+                f"{name} is an output, such as that of an accelerometer, of a system "
+                "with switching surfaces, where it jumps; leave this channel out."
+            )
 
 
 def refuse_repeated(parameters) -> None:

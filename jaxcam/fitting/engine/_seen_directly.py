@@ -10,7 +10,8 @@ from ._each_record import kinds
 from ._layout import Layout
 from ._model import DriveState
 from ._pieces import Pieces
-from ._predict import Calibration, Nodes, samples
+from ._predict import Calibration, samples
+from ._readings import Nodes
 
 
 _KNOWN = Cache()

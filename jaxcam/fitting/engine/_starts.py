@@ -1,6 +1,7 @@
 """Estimate initial states of the pieces of a recording."""
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -9,13 +10,13 @@ import numpy as np
 from ...recordings import Segments
 from ...recordings.against_model import size_of, state_at
 from ...recordings.cut import fit_local
-from ._model import filtered_channels, Model
+from ._model import filtered_channels, Model, state_channels
 from ._pieces import Pieces, Span
 
 
 def state_size(model: Model) -> int:
     """Return the number of components of the system's state."""
-    return size_of(model.system, {n: s.observe for n, s in model.sensors.items()})
+    return size_of(model.system, state_channels(model))
 
 
 def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
@@ -25,7 +26,13 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
     size = state_size(model)
     lags = filtered_channels(model)
     sensors = model.sensors
-    direct = [name for name in sensors if name not in lags] or list(sensors)
+    observed = state_channels(model)
+    direct = [name for name in observed if name not in lags] or list(observed)
+    if not direct:
+        raise ValueError(
+            "every channel is an output, such as that of an accelerometer, so the "
+            "initial states are unknown; add a sensor for a component of the state"
+        )
     states = np.zeros((*pieces.joint.shape, size + len(lags)))
     guess = np.zeros((*pieces.rest_exists.shape, size))
     for row, (part, sides) in enumerate(zip(segments, cuts)):
@@ -38,7 +45,7 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
                 for span in _with_samples(side)
             ]
             both = np.array(local)
-            picks = [sensors[name].observe for name in direct]
+            picks = [observed[name] for name in direct]
             system = _still(model, part)
             known = both[..., 0], both[..., 1]
             state = np.array(state_at(system, picks, clock, *known, size))
@@ -49,8 +56,10 @@ def suggested_starts(model: Model, segments, cuts, pieces: Pieces):
             found[row, : len(side), :size] = state
             if found is states:
                 for place, name in enumerate(lags):
-                    seen = jax.vmap(sensors[name].seen)(jnp.asarray(state))
-                    found[row, : len(side), size + place] = seen
+                    seen = partial(sensors[name].seen, system)
+                    found[row, : len(side), size + place] = jax.vmap(seen)(
+                        jnp.asarray(clock), jnp.asarray(state)
+                    )
     return states, guess
 
 

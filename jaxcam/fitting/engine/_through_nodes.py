@@ -11,7 +11,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ._predict import Calibration, Nodes
+from ._predict import Calibration
+from ._readings import Nodes
 
 
 # Numbers of quantities on which a sample depends: those of its step and of its sensor
