@@ -7,6 +7,11 @@ from ._fast_speed import (
     usual_acceleration as usual_acceleration,
 )
 from ._gaps import segment_gaps as segment_gaps
+from ._given_impacts import GivenImpact as GivenImpact, GivenImpacts as GivenImpacts
+from ._oscillation import (
+    hides_kinks as hides_kinks,
+    oscillation_period as oscillation_period,
+)
 from ._padding import padded as padded
 from ._polynomial import (
     fit_local as fit_local,
