@@ -14,6 +14,7 @@ from ..recordings import Recording, RecordingError, segment
 from ..recordings.against_model import size_of
 from ..recordings.cut import (
     Drive,
+    GivenImpacts,
     padded,
     read_drive,
     saturated,
@@ -30,6 +31,7 @@ from .engine import (
     parameter_places,
     with_constants,
 )
+from .flown import located
 
 
 # Number of samples at which the dependence of a gap on the state is evaluated
@@ -52,6 +54,10 @@ def segment_by_model(
     If channels that do not saturate also measure the velocities that the rate of change
     of a gap depends on, impacts are jumps of this rate, and contacts are stretches in
     which it is zero. If the system has no gap, each recording is one flight.
+
+    In a motion that bends within ten milliseconds as much as an impact bends it, impacts
+    are found with the model: it flies from each possible impact to the next, and an
+    impact without which it describes the samples as well is rejected.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts
@@ -106,7 +112,11 @@ def segment_by_model(
         )
 
     found = again([()] * len(recordings))
-    if parameters and any(part.impacts.count for part in found):
+    # flights of the model have already been searched for missed impacts
+    rest = any(
+        one.given is None and part.impacts.count for one, part in zip(gaps, found)
+    )
+    if parameters and rest:
         found = with_missed_impacts(model, parameters, found, again)
     if progress is not None:
         progress(1.0)
@@ -115,13 +125,15 @@ def segment_by_model(
 
 class _ShownGaps(NamedTuple):
     """The gaps that can be computed from the channels, `(g, k)`, their errors `(g,)`,
-    and for each its rate of change `(k,)` if that can be computed too.
+    for each its rate of change `(k,)` if that can be computed too, and the impacts if
+    only a model can find them.
     """
 
     gaps: Float[np.ndarray, "g k"]
     errors: Float[np.ndarray, " g"]
     rates: list[Float[np.ndarray, " k"] | None]
     drive: Drive | None
+    given: GivenImpacts | None
 
 
 def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGaps:
@@ -135,7 +147,10 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
     if np.any(shown):
         _refuse_unseen(model, picks, recording, slopes)
     rates = [rate for rate, one in zip(rates, shown) if one]
-    return _ShownGaps(gaps[shown], errors[shown], rates, drive)
+    given = None
+    if np.all(shown) and len(gaps):
+        given = located(here, parameters, recording, gaps, errors, drive)
+    return _ShownGaps(gaps[shown], errors[shown], rates, drive, given)
 
 
 def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
@@ -157,6 +172,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
         restitution=restitution,
         doubted=doubted,
         rates=shown.rates,
+        given=shown.given,
     )
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.ndimage import minimum_filter1d
 
 
 # Largest gap at an impact, in standard deviations of a sample
@@ -14,8 +15,10 @@ def candidates(
     gaps: Float[np.ndarray, "g k"],
     noises: Float[np.ndarray, " g"],
     errors: Float[np.ndarray, " g"],
+    apart: int,
 ) -> Int[np.ndarray, " m"]:
-    """Return the samples at which an impact is possible.
+    """Return the samples at which an impact is possible: each is the lowest of those
+    within `apart` samples.
 
     Between two samples, the motion may have been closer to the surface than at either
     of them, at most by the distance that it covers in a sampling interval.
@@ -27,9 +30,7 @@ def candidates(
     for gap, noise, error in zip(gaps, noises, errors, strict=True):
         step = np.abs(np.diff(gap))
         step = np.maximum(np.append(step, step[-1:]), np.append(step[:1], step))
-        lowest = np.ones(len(gap), dtype=bool)
-        lowest[1:] &= gap[1:] <= gap[:-1]
-        lowest[:-1] &= gap[:-1] < gap[1:]
+        lowest = gap == minimum_filter1d(gap, 2 * apart + 1)
         found |= lowest & (gap < min(error, np.ptp(gap) / 2) + _NEAR * noise + step)
     found[:2] = found[-2:] = False
     return np.flatnonzero(found)

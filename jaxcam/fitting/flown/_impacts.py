@@ -11,12 +11,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ..engine import Parameter
 from ._candidates import candidates, near_a_surface
 from ._meeting import Meeting, meeting
-from ._windows import Flights, Flyer, MARGIN, Window
+from ._windows import Flyer, Window
 
 
 # An impact is accepted if it reduces the cost by more than this
@@ -33,8 +33,8 @@ _ROUNDS, _STEPS = 12, 4
 _UNCLEAR, _LOCATED = 0.6, 0.1
 # Standard error (in samples) of the place of an impact that is located
 _SHARP = 0.25
-# Fewest samples of a flight
-_LEAST = 3
+# Fewest samples of a flight; impacts in one oscillation that are told apart at first
+_LEAST, _CLOSEST = 3, 40
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Search:
         self.reach = reach
         self.scale = 1.0
         self.near = near_a_surface(gaps, noises, errors)
-        found = candidates(gaps, noises, errors)
+        found = candidates(gaps, noises, errors, max(1, reach // _CLOSEST))
         self.marks = [_Mark(float(k)) for k in found]
         self.refused: set[int] = set()
 
@@ -94,15 +94,33 @@ class Search:
         for _ in range(_STEPS):
             self._adjust()
         for _ in range(_ROUNDS):
-            self._adjust()
-            self._assess()
-            dropped = self._drop()
-            if dropped:
-                continue
+            self._reject()
             if not self._insert():
                 break
-        self._assess()
+        else:
+            self._reject()
         return [mark.met for mark in self.marks if mark.met is not None]
+
+    def described(self) -> Bool[np.ndarray, " k"]:
+        """Return whether a flight describes each sample."""
+        found = np.zeros(self.count, dtype=bool)
+        pieces = self._pieces()
+        if not pieces:
+            return found
+        flights = self.flyer.fly(pieces, self._precision())
+        each = flights.cost / np.maximum(flights.count - self._size, 1)
+        for (a, b), one in zip(pieces, each):
+            # a sample next to an impact belongs to one of the flights
+            found[max(a - 1, 0) : b + 1] |= one < _UNUSUAL * self.scale
+        return found
+
+    def _reject(self) -> None:
+        """Reject impacts, one by one, until each of those that remain is significant."""
+        while True:
+            self._adjust()
+            self._assess()
+            if not self._drop():
+                break
 
     # windows
 
@@ -133,7 +151,7 @@ class Search:
         if not pieces:
             return
         found = self.flyer.fly(pieces, None)
-        free = found.count - found.normal.shape[1] * 0 - self._size
+        free = found.count - self._size
         each = found.cost / np.maximum(free, 1)
         long = free >= 4
         usual = float(np.median(each[long])) if np.any(long) else 1.0
@@ -201,6 +219,8 @@ class Search:
     def _insert(self) -> bool:
         """Add the impact that best explains the misfit of each flight."""
         pieces = self._pieces()
+        if not pieces:
+            return False
         found = self.flyer.fly(pieces, self._precision())
         each = found.cost / np.maximum(found.count - self._size, 1)
         added = []
@@ -224,6 +244,3 @@ class Search:
                 self.refused.add(places[best])
         self.marks = sorted([*self.marks, *added], key=lambda mark: mark.place)
         return bool(added)
-
-
-__all__ = ["Flights", "MARGIN", "Search"]

@@ -103,7 +103,9 @@ class Flyer(NamedTuple):
 
 
 @program
-def _fit(layout: Layout, record: Record, values, sizes, known, held, places, first, rows):
+def _fit(
+    layout: Layout, record: Record, values, sizes, known, held, places, first, rows
+):
     values, sizes, known = (jnp.asarray(x) for x in (values, sizes, known))
     many = len(values)
     size = record.guess.shape[-1]
@@ -151,10 +153,15 @@ def _fit(layout: Layout, record: Record, values, sizes, known, held, places, fir
             by = slopes[0] if whole else slopes
             jacobian = (by * weight[..., None]).reshape(-1, len(u))
             off = ((record.values[place] - shown) * weight).reshape(-1)
-            return jacobian.T @ jacobian, jacobian.T @ off, jnp.sum(off**2), (
-                slopes,
-                gap,
-                rate,
+            return (
+                jacobian.T @ jacobian,
+                jacobian.T @ off,
+                jnp.sum(off**2),
+                (
+                    slopes,
+                    gap,
+                    rate,
+                ),
             )
 
         def step(u, matrix, target):

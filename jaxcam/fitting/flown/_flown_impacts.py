@@ -1,0 +1,85 @@
+"""Find the impacts of a recording with flights of the model."""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ...hybrid import SwitchedSystem
+from ...recordings import Recording
+from ...recordings.cut import (
+    Drive,
+    GivenImpact,
+    GivenImpacts,
+    hides_kinks,
+    measured_noise,
+    oscillation_period,
+)
+from ..engine import Layout, Model, Parameter, parameter_places
+from ._impacts import Search
+from ._record import record_of
+from ._windows import Flyer, MARGIN
+
+
+# Fewest samples on either side of an impact from which it is assessed
+_FEWEST = 12
+# The number of samples of a prediction is rounded up to a multiple of this, so that
+# similar recordings share a program
+_SHARED = 32
+
+
+def located(
+    model: Model,
+    parameters: Sequence[Parameter],
+    recording: Recording,
+    gaps: Float[np.ndarray, "g k"],
+    errors: Float[np.ndarray, " g"],
+    drive: Drive | None,
+) -> GivenImpacts | None:
+    """Return the impacts of a recording, or `None` if they can be seen without a model.
+
+    **Arguments:** the model and the parameters to fit; the gaps at every sample and
+    their largest errors; the `drive`, if it has an encoder.
+    """
+    if isinstance(model.system, SwitchedSystem):
+        return None
+    interval = recording.interval
+    period = min(oscillation_period(gap, interval) for gap in gaps)
+    if not hides_kinks(period, interval):
+        return None
+    model = jax.tree.map(
+        lambda leaf: jnp.asarray(leaf) if isinstance(leaf, float) else leaf, model
+    )
+    return _flown(model, parameters, recording, gaps, errors, drive, period)
+
+
+def _flown(
+    model: Model,
+    parameters: Sequence[Parameter],
+    recording: Recording,
+    gaps: Float[np.ndarray, "g k"],
+    errors: Float[np.ndarray, " g"],
+    drive: Drive | None,
+    period: float,
+) -> GivenImpacts:
+    time, interval = recording.time, recording.interval
+    reach = max(_FEWEST, round(period / interval))
+    width = _SHARED * -(-(2 * reach + 2 * MARGIN) // _SHARED)
+    values = np.array([float(one.where(model)) for one in parameters])
+    sizes = np.array([p.size(float(v)) for p, v in zip(parameters, values)])
+    layout = Layout(model, parameter_places(model, parameters))
+    record = record_of(model, recording, drive, period)
+    flyer = Flyer(layout, record, values, sizes, width)
+    noises = np.array([measured_noise(gap) for gap in gaps])
+    search = Search(flyer, parameters, gaps, noises, errors, reach)
+    found = [
+        GivenImpact(
+            float(time[0] + one.place * interval),
+            max(one.place_stderr, 1e-6) * interval,
+            *one[2:],
+        )
+        for one in search.run()
+    ]
+    return GivenImpacts(tuple(found), search.described())
