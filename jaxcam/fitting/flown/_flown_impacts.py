@@ -11,6 +11,7 @@ from ...hybrid import SwitchedSystem
 from ...recordings import Recording
 from ...recordings.cut import (
     Drive,
+    given_contacts,
     GivenImpact,
     GivenImpacts,
     hides_kinks,
@@ -19,6 +20,7 @@ from ...recordings.cut import (
 )
 from ..engine import Layout, Model, Parameter, parameter_places
 from ._impacts import Search
+from ._meeting import Meeting
 from ._record import record_of
 from ._windows import Flyer, MARGIN
 
@@ -28,6 +30,8 @@ _FEWEST = 12
 # The number of samples of a prediction is rounded up to a multiple of this, so that
 # similar recordings share a program
 _SHARED = 32
+# Smallest standard error of the time of an impact, in samples
+_LEAST_STDERR = 1e-6
 
 
 def located(
@@ -74,12 +78,22 @@ def _flown(
     flyer = Flyer(layout, record, values, sizes, width)
     noises = np.array([measured_noise(gap) for gap in gaps])
     search = Search(flyer, parameters, gaps, noises, errors, reach)
+    given = _given(recording, search, search.run())
+    contacts = given_contacts(recording, gaps, list(errors), given)
+    if contacts:
+        # no flight describes a contact; the impacts near it depend on its ends
+        given = _given(recording, search, search.again(contacts))
+    return given
+
+
+def _given(recording: Recording, search: Search, met: list[Meeting]) -> GivenImpacts:
+    begin, interval = float(recording.time[0]), recording.interval
     found = [
         GivenImpact(
-            float(time[0] + one.place * interval),
-            max(one.place_stderr, 1e-6) * interval,
+            begin + one.place * interval,
+            max(one.place_stderr, _LEAST_STDERR) * interval,
             *one[2:],
         )
-        for one in search.run()
+        for one in met
     ]
     return GivenImpacts(tuple(found), search.described())

@@ -39,14 +39,20 @@ _LEAST, _CLOSEST = 3, 40
 
 @dataclasses.dataclass(frozen=True)
 class _Mark:
-    """A possible impact: its place and the width of its doubtful samples, in samples;
-    the decrease of the cost that it causes.
+    """A possible impact, or a contact: its place and the half-width of its doubtful
+    samples, in samples; the decrease of the cost that it causes.
     """
 
     place: float
     margin: float = _UNCLEAR
     gain: float = math.inf
     met: Meeting | None = None
+    contact: bool = False
+
+    @classmethod
+    def resting(cls, first: int, last: int) -> "_Mark":
+        """Return a contact, which no flight enters."""
+        return cls((first + last - 1) / 2, (last - first) / 2, contact=True)
 
     @property
     def last(self) -> int:
@@ -101,6 +107,17 @@ class Search:
             self._reject()
         return [mark.met for mark in self.marks if mark.met is not None]
 
+    def again(self, contacts: Sequence[tuple[int, int]]) -> list[Meeting]:
+        """Return the impacts outside the given contacts."""
+        outside = [
+            mark
+            for mark in self.marks
+            if not any(a - 1 <= mark.place <= b for a, b in contacts)
+        ]
+        blocked = [_Mark.resting(*span) for span in contacts]
+        self.marks = sorted([*outside, *blocked], key=lambda mark: mark.place)
+        return self.run()
+
     def described(self) -> Bool[np.ndarray, " k"]:
         """Return whether a flight describes each sample."""
         found = np.zeros(self.count, dtype=bool)
@@ -115,7 +132,7 @@ class Search:
         return found
 
     def _reject(self) -> None:
-        """Reject impacts, one by one, until each of those that remain is significant."""
+        """Reject impacts until each of those that remain is significant."""
         while True:
             self._adjust()
             self._assess()
@@ -194,6 +211,8 @@ class Search:
             gain = float(gain - more) / self.scale
             bounds = windows[left][1] - 1, windows[right][0]
             met = meeting(found, left, right, bounds, interval)
+            if mark.contact:
+                continue
             if met is None:
                 self.marks[k] = _Mark(mark.place, _UNCLEAR, min(gain, 0.0))
                 continue

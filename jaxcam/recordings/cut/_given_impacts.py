@@ -6,7 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ._contact_stretches import contact_stretches, merged, overlap, Span
+from ._contact_stretches import (
+    contact_stretches,
+    merged,
+    overlap,
+    SHORTEST_FLIGHT,
+    Span,
+)
 from ._motion import Motion
 from ._placed import shifted
 
@@ -80,24 +86,29 @@ class GivenImpacts:
                 found.setdefault(place, one)
         return found
 
-    def contacts(self, motion: Motion, side: int) -> dict[Span, int]:
-        """Return the contacts on a surface: the stretches near it that are not part of
-        one or two flights.
+    def contacts(self, motion: Motion) -> list[Span]:
+        """Return the contacts on a surface: the stretches near it, however short, that
+        are not part of one or two flights, and the flights before them that are too
+        short to be described.
         """
-        places = list(self.marks(motion.time))
-        return {
-            (first, last): side
-            for first, last in contact_stretches(motion)[0]
-            if not np.all(self.described[first:last])
-            or sum(first - 1 <= place <= last + 1 for place in places) > 1
-        }
+        places = sorted(self.marks(motion.time))
+        found: list[Span] = []
+        for first, last in contact_stretches(motion, least=0.0)[0]:
+            inside = [place for place in places if first - 1 <= place <= last + 1]
+            if np.all(self.described[first:last]) and len(inside) <= 1:
+                continue
+            for place in reversed(places):
+                if first - SHORTEST_FLIGHT <= place < first:
+                    first = place
+            found.append((first, last))
+        return found
 
 
 def given_places(sides, given: GivenImpacts):
     """Return contacts with the sides at their ends, and impacts with their side."""
     resting: dict[Span, int] = {}
     for number, side in enumerate(sides):
-        resting |= given.contacts(side, number)
+        resting |= dict.fromkeys(given.contacts(side), number)
     marks = {
         place: one.side
         for place, one in given.marks(sides[0].time).items()
