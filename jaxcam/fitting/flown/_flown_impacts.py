@@ -68,7 +68,7 @@ def _flown(
     drive: Drive | None,
     period: float,
 ) -> GivenImpacts:
-    time, interval = recording.time, recording.interval
+    interval = recording.interval
     reach = max(_FEWEST, round(period / interval))
     width = _SHARED * -(-(2 * reach + 2 * MARGIN) // _SHARED)
     values = np.array([float(one.where(model)) for one in parameters])

@@ -93,7 +93,8 @@ class GivenImpacts:
         """
         places = sorted(self.marks(motion.time))
         found: list[Span] = []
-        for first, last in contact_stretches(motion, least=0.0)[0]:
+        # the model decides about doubtful stretches, too
+        for first, last in sorted(sum(contact_stretches(motion, least=0.0), [])):
             inside = [place for place in places if first - 1 <= place <= last + 1]
             if np.all(self.described[first:last]) and len(inside) <= 1:
                 continue
