@@ -31,7 +31,7 @@ from .engine import (
     parameter_places,
     with_constants,
 )
-from .flown import located
+from .flown import located, shortest_period, with_coarse_note
 
 
 # Number of samples at which the dependence of a gap on the state is evaluated
@@ -57,7 +57,9 @@ def segment_by_model(
 
     If the motion itself bends within ten milliseconds as much as an impact bends it,
     impacts are found with the model: it flies from each possible impact to the next,
-    and an impact without which it describes the samples as well is rejected.
+    and an impact without which it describes the samples as well is rejected. If there
+    are too few samples per oscillation, a note is added to the recording's
+    `meta["notes"]`.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts
@@ -125,14 +127,15 @@ def segment_by_model(
 
 class _ShownGaps(NamedTuple):
     """The gaps that can be computed from the channels, `(g, k)`, their errors `(g,)`,
-    for each its rate of change `(k,)` if that can be computed too, and the impacts if
-    only a model can find them.
+    for each its rate of change `(k,)` if that can be computed too, the shortest period
+    of their oscillations (s), and the impacts if only a model can find them.
     """
 
     gaps: Float[np.ndarray, "g k"]
     errors: Float[np.ndarray, " g"]
     rates: list[Float[np.ndarray, " k"] | None]
     drive: Drive | None
+    period: float
     given: GivenImpacts | None
 
 
@@ -147,10 +150,10 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
     if np.any(shown):
         _refuse_unseen(model, picks, recording, slopes)
     rates = [rate for rate, one in zip(rates, shown) if one]
-    given = None
-    if np.all(shown) and len(gaps):
-        given = located(here, parameters, recording, gaps, errors, drive)
-    return _ShownGaps(gaps[shown], errors[shown], rates, drive, given)
+    period, given = shortest_period(gaps[shown], recording.interval), None
+    if len(gaps) and np.all(shown):
+        given = located(here, parameters, recording, gaps, errors, drive, period)
+    return _ShownGaps(gaps[shown], errors[shown], rates, drive, period, given)
 
 
 def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
@@ -158,7 +161,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
     if not len(shown.gaps):
         part = segment(recording, primary)
         return dataclasses.replace(part, drive=shown.drive)
-    time = recording.time
+    recording, time = with_coarse_note(recording, shown.period), recording.time
     doubted = [
         (int(np.searchsorted(time, start)), int(np.searchsorted(time, stop)))
         for start, stop in spans

@@ -16,7 +16,6 @@ from ...recordings.cut import (
     GivenImpacts,
     hides_kinks,
     measured_noise,
-    oscillation_period,
 )
 from ..engine import Layout, Model, Parameter, parameter_places
 from ._impacts import Search
@@ -41,17 +40,18 @@ def located(
     gaps: Float[np.ndarray, "g k"],
     errors: Float[np.ndarray, " g"],
     drive: Drive | None,
+    period: float,
 ) -> GivenImpacts | None:
     """Return the impacts of a recording, or `None` if they can be seen without a model.
 
     **Arguments:** the model and the parameters to fit; the gaps at every sample and
-    their largest errors; the `drive`, if it has an encoder.
+    their largest errors; the `drive`, if it has an encoder; the shortest `period` of
+    the oscillations of the gaps (s).
     """
+    # a step of the integration must not cross a switching surface
     if isinstance(model.system, SwitchedSystem):
         return None
-    interval = recording.interval
-    period = min(oscillation_period(gap, interval) for gap in gaps)
-    if not hides_kinks(period, interval):
+    if not hides_kinks(period, recording.interval):
         return None
     model = jax.tree.map(
         lambda leaf: jnp.asarray(leaf) if isinstance(leaf, float) else leaf, model
