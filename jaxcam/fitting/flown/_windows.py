@@ -117,8 +117,8 @@ def _fit(
         place = jnp.minimum(place, len(record.values) - 1)
         used = (place >= row[0]) & (place < row[1])
         known_here = record.known[place] & used[:, None]
-        weight = jnp.where(known_here, 1.0, 0.0) / record.noise
-        begin = record.begin + first * record.interval
+        weight = jnp.where(known_here, 1.0, 0.0) / record.noise[None]
+        begin = record.begin + first.astype(float) * record.interval
         drives = DriveState(*(part[place] for part in record.drive))
 
         def predicted(u):
@@ -188,9 +188,14 @@ def _fit(
         matrix, target, cost, (slopes, gap, rate) = normal(u, True)
         _, own, left, right = step(u, matrix, target)
         cost = cost + u[size:] @ known @ u[size:]
+        # an error of the parameters is an error of the flight, too
+        blank = jnp.zeros_like(matrix)
+        given = blank.at[size:, size:].set(known)
+        alone = blank.at[:size, :size].set(own)
+        covariance = jnp.where(held, alone, _inverse(matrix + given))
         errors = [
-            jnp.sqrt(jnp.einsum("wgi,ij,wgj->wg", by, own, by))
-            for by in (one[..., :size] for one in slopes[1:])
+            jnp.sqrt(jnp.einsum("wgi,ij,wgj->wg", by, covariance, by))
+            for by in slopes[1:]
         ]
         count = jnp.sum(known_here)
         return cost, count, left, right, gap, errors[0], rate, errors[1]
