@@ -33,6 +33,8 @@ _ROUNDS, _STEPS = 12, 4
 _UNCLEAR, _LOCATED = 0.6, 0.1
 # Standard error (in samples) of the place of an impact that is located
 _SHARP = 0.25
+# Assessments in a row that only move impacts, and the move (in samples) that ends them
+_SETTLING, _SETTLED = 5, 0.2
 # Fewest samples of a flight; impacts in one oscillation that are told apart at first
 _LEAST, _CLOSEST = 3, 40
 
@@ -132,12 +134,19 @@ class Search:
         return found
 
     def _reject(self) -> None:
-        """Reject impacts until each of those that remain is significant."""
-        while True:
+        """Reject impacts until each of those that remain is significant and in its
+        place.
+        """
+        settling = 0
+        while settling < _SETTLING:
             self._adjust()
-            self._assess()
-            if not self._drop():
+            moved = self._assess()
+            if self._drop():
+                settling = 0
+            elif moved < _SETTLED:
                 break
+            else:
+                settling += 1
 
     # windows
 
@@ -192,10 +201,13 @@ class Search:
 
     # impacts
 
-    def _assess(self) -> None:
-        """Locate every possible impact, and compute its gain."""
+    def _assess(self) -> float:
+        """Locate every possible impact, and compute its gain. Return the largest move
+        of an impact, in samples.
+        """
         if not self.marks:
-            return
+            return 0.0
+        moved = 0.0
         flights = self._between(self.marks)
         windows: list[Window] = []
         for before, after in zip(flights, flights[1:]):
@@ -220,7 +232,9 @@ class Search:
             sharp = met.place_stderr < _SHARP and place == met.place
             margin = _LOCATED if sharp else _UNCLEAR
             self.marks[k] = _Mark(place, margin, gain, met)
+            moved = max(moved, abs(place - mark.place))
         self.marks.sort(key=lambda mark: mark.place)
+        return moved
 
     def _drop(self) -> bool:
         """Reject the impacts without which the flights fit as well; of neighbours, only
@@ -230,6 +244,11 @@ class Search:
         gains[[0, -1]] = np.inf
         low = gains[1:-1] < _SURE
         least = low & (gains[1:-1] <= gains[:-2]) & (gains[1:-1] < gains[2:])
+        # between two impacts, there is a flight
+        for k, (one, other) in enumerate(zip(self.marks, self.marks[1:])):
+            short = other.last - one.first < _LEAST
+            if short and not (one.contact or other.contact):
+                least[k if one.gain < other.gain else k + 1] = True
         if np.any(low) and not np.any(least):
             least[int(np.argmin(gains[1:-1]))] = True
         self.marks = [m for m, out in zip(self.marks, least) if not out]
