@@ -2,7 +2,7 @@
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import minimum_filter1d
+from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 
 # Largest gap at an impact, in standard deviations of a sample
@@ -30,7 +30,8 @@ def candidates(
     for gap, noise, error in zip(gaps, noises, errors, strict=True):
         step = np.abs(np.diff(gap))
         step = np.maximum(np.append(step, step[-1:]), np.append(step[:1], step))
-        lowest = gap == minimum_filter1d(gap, 2 * apart + 1)
+        smooth = uniform_filter1d(gap, 2 * apart - 1)
+        lowest = smooth == minimum_filter1d(smooth, 2 * apart + 1)
         found |= lowest & (gap < min(error, np.ptp(gap) / 2) + _NEAR * noise + step)
     found[:2] = found[-2:] = False
     return np.flatnonzero(found)

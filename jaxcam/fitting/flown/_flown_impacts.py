@@ -21,7 +21,7 @@ from ..engine import Layout, Model, Parameter, parameter_places
 from ._impacts import Search
 from ._meeting import Meeting
 from ._record import record_of
-from ._windows import Flyer, MARGIN
+from ._windows import Flyer
 
 
 # Fewest samples on either side of an impact from which it is assessed
@@ -29,6 +29,9 @@ _FEWEST = 12
 # The number of samples of a prediction is rounded up to a multiple of this, so that
 # similar recordings share a program
 _SHARED = 32
+# Samples beyond a window at which its flight is predicted: a number, and a fraction of
+# an oscillation
+_MARGIN, _SEARCHED = 3, 40
 # Smallest standard error of the time of an impact, in samples
 _LEAST_STDERR = 1e-6
 
@@ -70,12 +73,13 @@ def _flown(
 ) -> GivenImpacts:
     interval = recording.interval
     reach = max(_FEWEST, round(period / interval))
-    width = _SHARED * -(-(2 * reach + 2 * MARGIN) // _SHARED)
+    margin = _MARGIN + reach // _SEARCHED
+    width = _SHARED * -(-2 * (reach + margin) // _SHARED)
     values = np.array([float(one.where(model)) for one in parameters])
     sizes = np.array([p.size(float(v)) for p, v in zip(parameters, values)])
     layout = Layout(model, parameter_places(model, parameters))
     record = record_of(model, recording, drive, period)
-    flyer = Flyer(layout, record, values, sizes, width)
+    flyer = Flyer(layout, record, values, sizes, width, margin)
     noises = np.array([measured_noise(gap) for gap in gaps])
     search = Search(flyer, parameters, gaps, noises, errors, reach)
     given = _given(recording, search, search.run())

@@ -222,14 +222,15 @@ class Search:
             more = found.count[both] - found.count[left] - found.count[right]
             gain = float(gain - more) / self.scale
             bounds = windows[left][1] - 1, windows[right][0]
-            met = meeting(found, left, right, bounds, interval)
+            extent = self.flyer.margin - 2
+            met = meeting(found, left, right, bounds, interval, extent)
             if mark.contact:
                 continue
             if met is None:
                 self.marks[k] = _Mark(mark.place, _UNCLEAR, min(gain, 0.0))
                 continue
-            place = float(np.clip(met.place, bounds[0] - 1, bounds[1] + 1))
-            sharp = met.place_stderr < _SHARP and place == met.place
+            place = met.place
+            sharp = met.place_stderr < _SHARP
             margin = _LOCATED if sharp else _UNCLEAR
             self.marks[k] = _Mark(place, margin, gain, met)
             moved = max(moved, abs(place - mark.place))

@@ -39,16 +39,21 @@ class Meeting(NamedTuple):
 
 
 def meeting(
-    flights: Flights, left: int, right: int, bounds: tuple[int, int], interval: float
+    flights: Flights,
+    left: int,
+    right: int,
+    bounds: tuple[int, int],
+    interval: float,
+    reach: int,
 ) -> Meeting | None:
     """Return the impact between two windows, or `None` if no gap jumps upwards there.
 
     **Arguments:** the rows of the windows before and after the impact; `bounds`: the
-    last sample before it and the first after it.
+    last sample before it and the first after it, which `reach` may extend.
     """
-    begin = max(bounds[0] - 1, int(flights.first[right]), int(flights.first[left]))
+    begin = max(bounds[0] - reach, int(flights.first[right]), int(flights.first[left]))
     width = flights.gaps.shape[1]
-    end = min(bounds[1] + 1, int(flights.first[left]) + width - 1)
+    end = min(bounds[1] + reach, int(flights.first[left]) + width - 1)
     if end <= begin:
         return None
     found = [

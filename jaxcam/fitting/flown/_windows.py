@@ -16,11 +16,9 @@ from ._record import readings_of, Record
 
 # Number of windows that one call fits; the last call is padded
 _ROWS = 128
-# Iterations of Gauss-Newton; a linear system needs one
-_ITERATIONS = 3
-# Samples before and after a window at which its flight is predicted, too: two flights
-# meet between their last and first samples
-MARGIN = 3
+# Iterations of Gauss-Newton; a linear system needs one. The parameters are held in the
+# first ones, because an initial state estimated from differences of samples is inexact
+_ITERATIONS, _HELD = 4, 2
 # Information on a component of the state, relative to the largest, below which the
 # samples of a window do not determine it
 _BLIND = 1e-10
@@ -60,8 +58,9 @@ class Flights(NamedTuple):
 class Flyer(NamedTuple):
     """A recording and the model that flies through its windows.
 
-    `values` and `sizes` are those of the parameters, `(p,)`; `width` is the number of
-    samples that a prediction covers.
+    `values` and `sizes` are those of the parameters, `(p,)`. A prediction covers
+    `width` samples; it begins `margin` samples before its window, because two flights
+    meet between their last and first samples.
     """
 
     layout: Layout
@@ -69,6 +68,7 @@ class Flyer(NamedTuple):
     values: Float[np.ndarray, " p"]
     sizes: Float[np.ndarray, " p"]
     width: int
+    margin: int
 
     def fly(
         self, windows: Sequence[Window], precision: Float[np.ndarray, "p p"] | None
@@ -85,7 +85,7 @@ class Flyer(NamedTuple):
         for k in range(0, len(edges), _ROWS):
             some = edges[k : k + _ROWS]
             rows = np.concatenate([some, np.repeat(some[-1:], _ROWS - len(some), 0)])
-            first = np.maximum(rows[:, 0] - MARGIN, 0)
+            first = np.maximum(rows[:, 0] - self.margin, 0)
             fitted = _fit(
                 self.layout,
                 self.record,
@@ -107,6 +107,7 @@ def _fit(
     layout: Layout, record: Record, values, sizes, known, held, places, first, rows
 ):
     values, sizes, known = (jnp.asarray(x) for x in (values, sizes, known))
+    held = jnp.asarray(held)
     many = len(values)
     size = record.guess.shape[-1]
     width = len(places)
@@ -164,7 +165,7 @@ def _fit(
                 ),
             )
 
-        def step(u, matrix, target):
+        def step(u, matrix, target, held):
             own = _inverse(matrix[:size, :size])
             across = matrix[size:, :size] @ own
             left = matrix[size:, size:] - across @ matrix[:size, size:]
@@ -179,14 +180,14 @@ def _fit(
             state = own @ (target[:size] - matrix[:size, size:] @ change)
             return jnp.concatenate([state, change]), own, left, right
 
-        def iterate(_, u):
+        def iterate(number, u):
             matrix, target, _, _ = normal(u, False)
-            return u + step(u, matrix, target)[0]
+            return u + step(u, matrix, target, held | (number < _HELD))[0]
 
         u = jnp.concatenate([record.guess[first], jnp.zeros(many)])
         u = jax.lax.fori_loop(0, _ITERATIONS, iterate, u)
         matrix, target, cost, (slopes, gap, rate) = normal(u, True)
-        _, own, left, right = step(u, matrix, target)
+        _, own, left, right = step(u, matrix, target, held)
         cost = cost + u[size:] @ known @ u[size:]
         # an error of the parameters is an error of the flight, too
         blank = jnp.zeros_like(matrix)
