@@ -37,7 +37,7 @@ class Flights(NamedTuple):
     - `normal`, `target`: information on the parameters, the state being eliminated,
         `(b, p, p)` and `(b, p)`.
     - `gaps`, `rates`: predicted gaps and their rates at each sample, `(b, w, g)`, and
-        their standard errors.
+        their standard errors; those of the gaps are due to the state alone.
     """
 
     first: Int[np.ndarray, " b"]
@@ -189,14 +189,16 @@ def _fit(
         matrix, target, cost, (slopes, gap, rate) = normal(u, True)
         _, own, left, right = step(u, matrix, target, held)
         cost = cost + u[size:] @ known @ u[size:]
-        # an error of the parameters is an error of the flight, too
         blank = jnp.zeros_like(matrix)
-        given = blank.at[size:, size:].set(known)
         alone = blank.at[:size, :size].set(own)
-        covariance = jnp.where(held, alone, _inverse(matrix + given))
+        # errors of the parameters move the gaps of both flights at an impact alike, but
+        # not the speeds before and after it
+        given = _inverse(matrix + blank.at[size:, size:].set(known))
         errors = [
             jnp.sqrt(jnp.einsum("wgi,ij,wgj->wg", by, covariance, by))
-            for by in slopes[1:]
+            for by, covariance in zip(
+                slopes[1:], (alone, jnp.where(held, alone, given)), strict=True
+            )
         ]
         count = jnp.sum(known_here)
         return cost, count, left, right, gap, errors[0], rate, errors[1]
