@@ -189,14 +189,18 @@ def test_a_slow_motion_does_not_need_the_model():
     assert hides_kinks(0.2, 1e-2)
 
 
-def test_a_constant_that_differs_between_recordings_counts():
-    """The known frequency of one recording is not that of the class."""
-    other = dataclasses.replace(
-        MODEL, system=dataclasses.replace(MODEL.system, frequency=jnp.asarray(50.0))
+def test_constants_of_a_recording_count_and_filtered_channels_do_not():
+    """The frequency of the recording is not that of the class; the samples of a
+    channel with a filter, which are zero here, do not show the motion directly.
+    """
+    filtered = Sensor(1, noise=1e-3, bandwidth_hz=300.0)
+    other = Model(
+        dataclasses.replace(MODEL.system, frequency=jnp.asarray(50.0)),
+        {**MODEL.sensors, "velocity_m_s": filtered},
     )
     times, positions, hits = _moved(2000.0, seconds=0.3)
-    run = dataclasses.replace(
-        _recorded(times, positions), constants={"frequency": 45.0}
-    )
+    run = _recorded(times, positions)
+    channels = {**run.channels, "velocity_m_s": np.zeros(len(times))}
+    run = dataclasses.replace(run, channels=channels, constants={"frequency": 45.0})
     (part,) = segment_by_model(other, [run], FREE)
     assert part.impacts.count == len(hits)

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...hybrid.programs import program
+from ...hybrid.runge_kutta import array_step, RK4
 from ...hybrid.surface import gaps
-from ..engine import DriveState, Layout, runge_kutta
+from ..engine import DriveState, Layout, Model
 from ._record import readings_of, Record
 
 
@@ -110,7 +111,6 @@ def _fit(
     held = jnp.asarray(held)
     many = len(values)
     size = record.guess.shape[-1]
-    width = len(places)
 
     def one(first, row):
         place = first + jnp.asarray(places)
@@ -124,26 +124,7 @@ def _fit(
 
         def predicted(u):
             model = layout.at(values + sizes * u[size:])
-            state = u[:size]
-
-            def step(state, inputs):
-                number, drive = inputs
-                t = begin + number * record.interval
-                system_at = model.during(t + record.interval / 2, drive)
-                part = record.interval / record.substeps
-                after, rate = runge_kutta(model, system_at, t, state, part)
-                for k in range(1, record.substeps):
-                    after, _ = runge_kutta(model, system_at, t + k * part, after, part)
-
-                def gap(t, x):
-                    return gaps(system_at(t), t, x)
-
-                along = (jnp.ones_like(t), rate)
-                shown = readings_of(model, record, state, rate)
-                return after, (shown, *jax.jvp(gap, (t, state), along))
-
-            numbers = jnp.arange(width, dtype=float)
-            return jax.lax.scan(step, state, (numbers, drives))[1]
+            return _predicted(model, record, u[:size], begin, drives)
 
         def normal(u, whole):
             def both(u):
@@ -204,6 +185,35 @@ def _fit(
         return cost, count, left, right, gap, errors[0], rate, errors[1]
 
     return jax.vmap(one)(jnp.asarray(first), jnp.asarray(rows))
+
+
+def _predicted(model: Model, record: Record, state, begin, drives: DriveState):
+    """Return the readings, the gaps and their rates at each sample, `(w, c)` and
+    `(w, g)`, of a flight from a state at time `begin`.
+    """
+
+    def step(state, inputs):
+        number, drive = inputs
+        t = begin + number * record.interval
+        system_at = model.during(t + record.interval / 2, drive)
+        part = record.interval / record.substeps
+
+        def field(t, x):
+            return system_at(t).vector_field(t, x)
+
+        after, _, rate = array_step(RK4, field, t, state, part)
+        for k in range(1, record.substeps):
+            after = array_step(RK4, field, t + k * part, after, part)[0]
+
+        def gap(t, x):
+            return gaps(system_at(t), t, x)
+
+        along = (jnp.ones_like(t), rate)
+        shown = readings_of(model, record, state, rate)
+        return after, (shown, *jax.jvp(gap, (t, state), along))
+
+    numbers = jnp.arange(drives.angle.shape[0], dtype=float)
+    return jax.lax.scan(step, state, (numbers, drives))[1]
 
 
 def _inverse(matrix):
