@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from jaxcam.fitting import fit, Model, Parameter, Problem, segment_by_model, Sensor
+from jaxcam.fitting import (
+    fit,
+    Model,
+    Parameter,
+    Problem,
+    restitution_laws,
+    segment_by_model,
+    Sensor,
+)
 from jaxcam.fitting.own_systems import Field
 from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import Recording
@@ -117,8 +125,8 @@ def coarse():
 
 
 def test_every_impact_is_found_and_none_is_invented(coarse):
-    """Kinks show 25 impacts here. The time follows from flights known to a hundredth of
-    a sampling interval.
+    """Kinks alone show 26 impacts here. The times follow from flights that are known to
+    a hundredth of a sampling interval.
     """
     part, hits = coarse
     assert len(hits) == 13
@@ -136,6 +144,13 @@ def test_single_impacts_show_the_restitution_within_their_errors(coarse):
     impacts = coarse[0].impacts
     off = (impacts.restitution - RESTITUTION) / impacts.restitution_stderr
     assert np.mean(off**2) < 2.6
+
+
+def test_impacts_of_one_speed_show_no_law_of_the_speed(coarse):
+    """A power law fitted to them would be extrapolated to any value at rest."""
+    part, _ = coarse
+    assert np.ptp(part.impacts.approach) < 0.1 * np.mean(part.impacts.approach)
+    assert list(restitution_laws([part])) == ["constant"]
 
 
 def test_a_fit_recovers_the_parameters(coarse):
