@@ -21,9 +21,11 @@ from ._windows import Flyer, Window
 
 # An impact is accepted if it reduces the cost by more than this
 _SURE = 30.0
-# A flight is searched for a missed impact if its cost per reading exceeds this multiple
-# of the usual one, and if the impact explains at least this part of the excess
-_UNUSUAL, _EXPLAINED = 2.0, 0.5
+# A flight is searched for a missed impact if its cost exceeds the expected one by this
+# many standard deviations. The impact must explain at least this part of the excess
+_UNLIKELY, _EXPLAINED = 5.0, 0.5
+# Multiple of the usual cost per reading up to which a flight describes its samples
+_UNUSUAL = 2.0
 # Costs above this multiple of the median count with less weight for the parameters
 _ROBUST = 4.0
 # Rounds of rejection and search, and steps of the parameters in the first round
@@ -261,10 +263,11 @@ class Search:
         if not pieces:
             return False
         found = self.flyer.fly(pieces, self._precision())
-        each = found.cost / np.maximum(found.count - self._size, 1)
+        free = np.maximum(found.count - self._size, 1)
+        usual = free + _UNLIKELY * np.sqrt(2.0 * free)
         added = []
-        for (a, b), cost, one, count in zip(pieces, found.cost, each, found.count):
-            if one < _UNUSUAL * self.scale or cost - count < _SURE * self.scale:
+        for (a, b), cost, most, count in zip(pieces, found.cost, usual, found.count):
+            if cost < most * self.scale or cost - count < _SURE * self.scale:
                 continue
             places = [
                 k

@@ -8,7 +8,7 @@ from ._polynomial import least_noise
 
 
 # Kinks are detected reliably if the period of the motion is at least this many windows
-_WINDOWS = 4.0
+_WINDOWS = 5.0
 # Number of samples of the shortest window
 _SHORTEST = 6
 
