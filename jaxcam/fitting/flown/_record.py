@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -21,7 +20,7 @@ _MOST_SUBSTEPS = 8
 
 
 class Record(eqx.Module):
-    """Samples `(k, c)` of the channels that show the state without a filter.
+    """Samples `(k, c)` of the channels that show a component of the state, unfiltered.
 
     The arrays are padded, so that recordings of similar lengths share a program.
     `drive` holds the motion of the
@@ -50,7 +49,11 @@ def record_of(
     its oscillation (s).
     """
     sensors = model.sensors
-    names = tuple(name for name in sensors if not sensors[name].filtered)
+    names = tuple(
+        name
+        for name, sensor in sensors.items()
+        if isinstance(sensor.observe, int) and not sensor.filtered
+    )
     time, interval = recording.time, recording.interval
     columns = np.stack([recording[name] for name in names], axis=-1)
     hidden = [saturated(recording[name]) for name in names]
@@ -101,8 +104,8 @@ def readings_of(model: Model, record: Record, state, rate) -> Float[Array, " c"]
     found = []
     for name in record.channels:
         sensor = model.sensors[name]
-        value, slope = jax.jvp(sensor.seen, (state,), (rate,))
+        value = state[sensor.observe]
         if record.lagged:
-            value = value - sensor.lag * slope
+            value = value - sensor.lag * rate[sensor.observe]
         found.append(sensor.offset + sensor.gain * value)
     return jnp.stack(found)
