@@ -282,6 +282,7 @@ def test_from_recordings_to_a_fitted_system(rig):
     # laws from the impacts on either stop
     assert "constraint 0: ConstantRestitution" in said and "constraint 1:" in said
     assert (rig / "fit" / "residuals_time.png").exists()
+    assert said.count("Rough estimates of the restitution from single impacts") == 1
     # there is no drive to draw them by
     assert not (rig / "fit" / "residuals_phase.png").exists()
     fitted = json.loads((rig / "fitted.json").read_text())

@@ -86,7 +86,6 @@ def diagnose(
         _refuse_without_drive(nominal)
     output = Output(json_file, out)
     keep = _kept_fits(out, resume)
-    notes = notes_of(runs)
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
             nominal,
@@ -98,7 +97,9 @@ def diagnose(
             keep=keep,
             policy=_policy(minutes),
         )
-        figures = []
+        # the segmentation may add a note to a recording
+        used = (part.recording for part in found.after.problem.segments)
+        notes, figures = notes_of([*runs, *used]), []
         if out is not None:
             report("drawing", None)
             figures = write_diagnosis(out, found, notes)

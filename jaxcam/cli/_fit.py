@@ -91,9 +91,11 @@ def fit(
         if out is not None:
             report("drawing", None)
             figures = draw(out, found.before, found.after)
-    print_fit(output, found, notes_of(runs))
+    # the segmentation may add a note to a recording
+    notes = notes_of([*runs, *(part.recording for part in found.segments)])
+    print_fit(output, found, notes)
     output.print_figures(figures)
-    about = {"case": runs.name, "notes": list(notes_of(runs)), "figures": figures}
+    about = {"case": runs.name, "notes": list(notes), "figures": figures}
     written = found.to_json(about)
     output.write_json(written)
     if json_file is not None and "not_saved" in written:

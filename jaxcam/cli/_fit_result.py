@@ -171,6 +171,8 @@ def fitted(
         laws = impact_laws(segments, model.system)
     else:
         laws = fitting.restitution_laws(segments)
+    # a law whose fit did not converge means nothing
+    laws = {name: law for name, law in laws.items() if law.converged}
     again = None
     if bootstrap:
         again = fitting.bootstrap(
@@ -191,6 +193,11 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
     output.print(found.after.most_correlated())
     for sentence in found.outside:
         output.print(sentence)
+    if found.laws:
+        output.print(
+            "Rough estimates of the restitution from single impacts; the result is the "
+            "fit of the whole motion above:"
+        )
     for name, law in found.laws.items():
         where = name.rpartition(", ")[0]
         sentence = law.sentence()

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from ..models import ConstantRestitution, PowerLawRestitution
 from ..recordings import ImpactTable, RecordingError
 from ._momentum import momentum_of, MomentumBalance
-from ._restitution import fit_rows, RestitutionFit
+from ._restitution import fit_rows, RANGE, RestitutionFit
 
 
 # Minimum number of impacts from which a law and its scatter can be estimated
@@ -25,9 +25,6 @@ _CHANCE = 0.01
 _MAJORITY = 0.7
 # standard deviation of a Gaussian variable, divided by the median of its absolute value
 _MAD = 1.4826
-# Ratio of the highest to the lowest speed below which the table shows little about how
-# restitution depends on speed
-_RANGE = 1.5
 # A constant law whose mean squared residual is below this fraction of the squared
 # scatter counts as exact
 _NOTHING = 1e-4
@@ -130,7 +127,7 @@ class ImpactLaw:
             rows = ", ".join(map(str, self.set_aside))
             found.append(f"Excluded as an outlier: row {rows}; check the table.")
         span = float(np.max(table.approach) / np.min(table.approach))
-        if span < _RANGE:
+        if span < RANGE:
             found.append(
                 f"The fastest impact is only {span:.2f} times as fast as the slowest: "
                 f"this shows little about how restitution depends on speed."

@@ -23,6 +23,11 @@ _HUBER = 3.0
 # Largest decrease of the cost predicted for a further step at an optimum: such a step
 # changes no parameter by more than a tenth of its standard error
 _GRADIENT = 1e-2
+# Ratio of high to low approach speeds below which impacts show little about how
+# restitution depends on speed
+RANGE = 1.5
+# Quantiles of the speeds that are compared, because the slowest are inaccurate
+_LOW, _HIGH = 0.05, 0.95
 # Runge-Kutta steps of one flight
 _STEPS = 200
 
@@ -86,7 +91,8 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     Returns:
         The laws `"constant"`, `"speed"` (linear in the speed of the drive; thesis,
             Figure 4.15) and `"approach"` (a power of the approach speed); laws with
-            undetermined parameters are omitted.
+            undetermined parameters are omitted, and the last one if all approach speeds
+            are similar.
 
     Raises:
         RecordingError: There are too few impacts.
@@ -112,6 +118,9 @@ def restitution_laws(segments: Sequence[Segments]) -> dict[str, RestitutionFit]:
     speeds = {part.drive.speed for part in segments if part.drive is not None}
     if len(speeds) < 2:
         del start["speed"]
+    clear = approach[approach > 0]
+    if len(clear) and np.quantile(clear, _HIGH) < RANGE * np.quantile(clear, _LOW):
+        del start["approach"]
     found = {}
     for name, (law, names) in start.items():
         try:

@@ -13,6 +13,7 @@ from ..hybrid.programs import program
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.cut import (
     Drive,
+    GivenImpacts,
     padded,
     read_drive,
     saturated,
@@ -30,6 +31,7 @@ from .engine import (
     state_size,
     with_constants,
 )
+from .flown import located, shortest_period, with_coarse_note
 
 
 # Number of samples at which the dependence of a gap on the state is evaluated
@@ -52,6 +54,12 @@ def segment_by_model(
     If channels that do not saturate also measure the velocities that the rate of change
     of a gap depends on, impacts are jumps of this rate, and contacts are stretches in
     which it is zero. If the system has no gap, each recording is one flight.
+
+    If the motion itself bends within ten milliseconds as much as an impact bends it,
+    impacts are found with the model: it flies from each possible impact to the next,
+    and an impact without which it describes the samples as well is rejected. If there
+    are too few samples per oscillation, a note is added to the recording's
+    `meta["notes"]`.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts
@@ -106,7 +114,11 @@ def segment_by_model(
         )
 
     found = again([()] * len(recordings))
-    if parameters and any(part.impacts.count for part in found):
+    # flights of the model have already been searched for missed impacts
+    rest = any(
+        one.given is None and part.impacts.count for one, part in zip(gaps, found)
+    )
+    if parameters and rest:
         found = with_missed_impacts(model, parameters, found, again)
     if progress is not None:
         progress(1.0)
@@ -115,13 +127,16 @@ def segment_by_model(
 
 class _ShownGaps(NamedTuple):
     """The gaps that can be computed from the channels, `(g, k)`, their errors `(g,)`,
-    and for each its rate of change `(k,)` if that can be computed too.
+    for each its rate of change `(k,)` if that can be computed too, the shortest period
+    of their oscillations (s), and the impacts if only a model can find them.
     """
 
     gaps: Float[np.ndarray, "g k"]
     errors: Float[np.ndarray, " g"]
     rates: list[Float[np.ndarray, " k"] | None]
     drive: Drive | None
+    period: float
+    given: GivenImpacts | None
 
 
 def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGaps:
@@ -135,7 +150,10 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
     if np.any(shown):
         _refuse_unseen(model, picks, recording, slopes)
     rates = [rate for rate, one in zip(rates, shown) if one]
-    return _ShownGaps(gaps[shown], errors[shown], rates, drive)
+    period, given = shortest_period(gaps[shown], recording.interval), None
+    if len(gaps) and np.all(shown):
+        given = located(here, parameters, recording, gaps, errors, drive, period)
+    return _ShownGaps(gaps[shown], errors[shown], rates, drive, period, given)
 
 
 def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
@@ -143,7 +161,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
     if not len(shown.gaps):
         part = segment(recording, primary)
         return dataclasses.replace(part, drive=shown.drive)
-    time = recording.time
+    recording, time = with_coarse_note(recording, shown.period), recording.time
     doubted = [
         (int(np.searchsorted(time, start)), int(np.searchsorted(time, stop)))
         for start, stop in spans
@@ -157,6 +175,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
         restitution=restitution,
         doubted=doubted,
         rates=shown.rates,
+        given=shown.given,
     )
 
 

@@ -203,7 +203,7 @@ def gather(
         names = ", ".join(part.recording.name for part in segments)
         raise RecordingError(
             f"{names}: there is no flight of at least {_LEAST} samples to fit; give a "
-            "recording in which the motion leaves the surface."
+            "recording in which the motion leaves the surface, or record faster."
         )
     multiple = _PADDED if steps <= _FEW_STEPS else _LESS_PADDED
     width = multiple * -(-max(len(flown) for flown, _ in cuts) // multiple)

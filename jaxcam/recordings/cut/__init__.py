@@ -6,7 +6,12 @@ from ._fast_speed import (
     fast_speed as fast_speed,
     usual_acceleration as usual_acceleration,
 )
-from ._gaps import segment_gaps as segment_gaps
+from ._gaps import given_contacts as given_contacts, segment_gaps as segment_gaps
+from ._given_impacts import GivenImpact as GivenImpact, GivenImpacts as GivenImpacts
+from ._oscillation import (
+    hides_kinks as hides_kinks,
+    oscillation_period as oscillation_period,
+)
 from ._padding import padded as padded
 from ._polynomial import (
     fit_local as fit_local,

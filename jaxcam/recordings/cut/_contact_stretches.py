@@ -30,16 +30,20 @@ SIGNIFICANT = 5.0
 SHORTEST_FLIGHT = 5
 
 
-def contact_stretches(motion: Motion) -> tuple[list[Span], list[Span]]:
+def contact_stretches(
+    motion: Motion, least: float = SHORTEST_CONTACT
+) -> tuple[list[Span], list[Span]]:
     """Return the long stretches near the surface, including any low flights in them.
 
     A second list contains stretches that may be slow impacts or grazing contacts.
+
+    **Arguments:** `least`: minimum duration of a contact (s).
     """
     near = motion.gap < LOW * motion.noise
     moving = np.zeros(len(near), bool) if motion.seen is None else motion.seen.moving
     # a single outlier among thousands of samples is not a flight
     near = binary_closing(np.pad(near, 3, mode="edge"), np.ones(3))[3:-3] & ~moving
-    shortest = max(4, round(SHORTEST_CONTACT / motion.interval))
+    shortest = max(4, round(least / motion.interval))
     long = [pair for pair in stretches(near) if pair[1] - pair[0] >= shortest]
     if motion.seen is not None:
         long = [pair for pair in long if not motion.seen.turns(*pair)]

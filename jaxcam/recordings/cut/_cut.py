@@ -15,6 +15,7 @@ from ._contact_stretches import (
     SIGNIFICANT,
     Span,
 )
+from ._given_impacts import given_places, GivenImpacts
 from ._impact_marks import away, impact_marks
 from ._impact_speeds import speeds
 from ._kinks import WINDOW
@@ -37,7 +38,10 @@ _FAR_NOISE, _FAR_GAP = 20.0, 0.25
 
 
 def cut(
-    sides: Sequence[Motion], restitution: float, doubted: Sequence[Span] = ()
+    sides: Sequence[Motion],
+    restitution: float,
+    doubted: Sequence[Span] = (),
+    given: GivenImpacts | None = None,
 ) -> tuple[tuple[Flight, ...], tuple[Contact, ...], Impacts]:
     """Segment a motion within one or several surfaces.
 
@@ -50,16 +54,24 @@ def cut(
     - `doubted`: stretches of samples that a model of the flight does not describe; a
         less significant impact is sought there, and a flight that follows contact
         begins at the last sample near the surface.
+    - `given`: the impacts, if a model of the flights has located them.
     """
     motion = sides[0]
-    resting, doubtful, marks = _places(sides, doubted)
+    if given is None:
+        resting, doubtful, marks = _places(sides, doubted)
+        located = {}
+    else:
+        resting, doubtful, marks = given_places(sides, given)
+        located = given.marks(motion.time)
     while True:
         stretches = sorted([*resting, *doubtful])
         spans = _spans(len(motion.time), stretches, sorted(marks))
         before = {b: a for a, b in spans}
         after = dict(spans)
         crossed = {
-            place: _crossed(sides[number], before[place], place, after[place])
+            place: located[place].crossed()
+            if place in located
+            else _crossed(sides[number], before[place], place, after[place])
             for place, number in marks.items()
             if place in before and place in after
         }

@@ -9,6 +9,7 @@ from .._drive import Drive
 from .._recording import Recording
 from ._cut import cut
 from ._gap_rate import GapRate
+from ._given_impacts import given_places, GivenImpacts
 from ._inside import refuse_inside
 from ._motion import Motion
 from ._placed import placed
@@ -26,6 +27,7 @@ def segment_gaps(
     restitution: float = 0.5,
     doubted: Sequence[tuple[int, int]] = (),
     rates: Sequence[Float[np.ndarray, " k"] | None] | None = None,
+    given: GivenImpacts | None = None,
 ) -> Segments:
     """Segment a recording at the impacts at each gap, given the gaps at every sample.
 
@@ -44,23 +46,16 @@ def segment_gaps(
         the flight does not describe; an impact is sought there.
     - `rates`: for each gap, its measured rate of change at every sample, or `None` if
         it is not measured.
+    - `given`: the impacts, if a model of the flights has located them.
 
     **Returns:** the segments; `impacts.side` is the index of the gap that closed, and
     `impacts.before` and `impacts.after` are its rates of change.
 
     **Raises:** `RecordingError` if a gap is far below zero most of the time.
     """
-    none = np.zeros(len(recording))
-    sides = []
-    rates = [None] * len(gaps) if rates is None else rates
-    time, interval = recording.time, recording.interval
-    for gap, tolerance, rate in zip(gaps, tolerances, rates, strict=True):
-        seen = None if rate is None else GapRate.of(time, rate, gap, interval)
-        noise = measured_noise(gap)
-        side = Motion(time, gap, none, none, noise, interval, seen=seen)
-        sides.append(placed(side, tolerance) if tolerance > 0 else side)
+    sides = _sides(recording, gaps, tolerances, rates, given)
     refuse_inside(recording.name, sides, tolerances)
-    flights, contacts, impacts = cut(sides, restitution, doubted)
+    flights, contacts, impacts = cut(sides, restitution, doubted, given)
     return Segments(
         recording,
         channel,
@@ -72,3 +67,34 @@ def segment_gaps(
         gap=np.min([side.gap for side in sides], axis=0),
         drive=drive,
     )
+
+
+def given_contacts(
+    recording: Recording,
+    gaps: Float[np.ndarray, "g k"],
+    tolerances: Sequence[float],
+    given: GivenImpacts,
+) -> list[tuple[int, int]]:
+    """Return the stretches of samples in contact, if the impacts are given; see
+    `segment_gaps`.
+    """
+    sides = _sides(recording, gaps, tolerances, None, given)
+    return sorted(given_places(sides, given)[0])
+
+
+def _sides(recording, gaps, tolerances, rates, given) -> list[Motion]:
+    """Return the motion relative to each surface."""
+    none = np.zeros(len(recording))
+    sides = []
+    rates = [None] * len(gaps) if rates is None else rates
+    time, interval = recording.time, recording.interval
+    for gap, tolerance, rate in zip(gaps, tolerances, rates, strict=True):
+        seen = None if rate is None else GapRate.of(time, rate, gap, interval)
+        noise = measured_noise(gap)
+        side = Motion(time, gap, none, none, noise, interval, seen=seen)
+        if tolerance > 0 and given is None:
+            side = placed(side, tolerance)
+        elif tolerance > 0 and given is not None:
+            side = given.placed(len(sides), side, tolerance)
+        sides.append(side)
+    return sides

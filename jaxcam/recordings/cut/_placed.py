@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from jaxtyping import Float
 
 from ._jump_point import jump_point
 from ._motion import Motion
@@ -30,9 +31,23 @@ def placed(motion: Motion, tolerance: float) -> Motion:
         off = impact.before - np.interp(impact.time, time, motion.contact)
         if abs(off) < tolerance + _OUTLIER * impact.stderr:
             found.append((off, impact.stderr))
-    if not found:
+    off, error = np.array(found).reshape(-1, 2).T
+    return shifted(motion, off, error, tolerance)
+
+
+def shifted(
+    motion: Motion,
+    off: Float[np.ndarray, " i"],
+    error: Float[np.ndarray, " i"],
+    tolerance: float,
+) -> Motion:
+    """Return the motion with its surface shifted to the impacts, as far as the
+    tolerance allows.
+
+    **Arguments:** the gaps at the impacts, and their standard errors.
+    """
+    if not len(off):
         return motion
-    off, error = np.array(found).T
     usual = np.abs(off - np.median(off)) < _OUTLIER * np.maximum(error, motion.noise)
     if not np.any(usual):
         return motion
