@@ -247,8 +247,8 @@ def simulated(model: Model, one: Prepared) -> Simulated:
             else:
                 read = partial(sensor.seen, system)
                 value, slope = jax.jvp(read, (t, x[:size]), along)
-            lag = sensor.lag - sensor.removed_lag
-            values.append(sensor.offset + sensor.gain * (value - lag * slope))
+            value = value - sensor.remaining_lag * slope
+            values.append(sensor.offset + sensor.gain * value)
         gap = jnp.min(gaps(system, t, x[:size]), initial=jnp.inf)
         return Simulated(jnp.stack(values), gap, jnp.asarray(events, dtype=int))
 

@@ -25,6 +25,7 @@ from ._missed_impacts import Spans, with_missed_impacts
 from .engine import (
     DriveState,
     Layout,
+    measured_components,
     Model,
     Parameter,
     parameter_places,
@@ -96,11 +97,8 @@ def segment_by_model(
     """
     parameters = tuple(parameters)
     recordings = tuple(recordings)
-    picks = {
-        sensor.observe: name
-        for name, sensor in reversed(tuple(model.sensors.items()))
-        if isinstance(sensor.observe, int) and not sensor.filtered
-    }
+    measured = tuple(measured_components(model).items())
+    picks = {component: name for name, component in reversed(measured)}
     gaps = []
     for k, recording in enumerate(recordings):
         if progress is not None:

@@ -87,6 +87,11 @@ class Sensor(eqx.Module):
         return jnp.sqrt(self.noise**2 + self.resolution**2 / 12)
 
     @property
+    def remaining_lag(self) -> Float[Array, ""]:
+        """Lag that the recordings contain (s)."""
+        return self.lag - self.removed_lag
+
+    @property
     def filtered(self) -> bool:
         return self.bandwidth_hz != float("inf")
 
@@ -272,6 +277,17 @@ _CAM_DRIVE = Turning(_speed, _phase)
 def filtered_channels(model: Model) -> tuple[str, ...]:
     """Return the channels whose sensor has a bandwidth and therefore a filter state."""
     return tuple(name for name in model.sensors if model.sensors[name].filtered)
+
+
+def measured_components(model: Model) -> dict[str, int]:
+    """Return the channels that show one component of the state without a filter, and
+    its index.
+    """
+    return {
+        name: sensor.observe
+        for name, sensor in model.sensors.items()
+        if isinstance(sensor.observe, int) and not sensor.filtered
+    }
 
 
 def state_channels(model: Model) -> dict[str, int | Callable[[Array], Array]]:

@@ -191,7 +191,7 @@ class Calibration(NamedTuple):
 
 def calibration(model: Model) -> Calibration:
     """Return the calibration of a model's sensors."""
-    rows = [(s.offset, s.gain, s.lag - s.removed_lag) for s in model.sensors.values()]
+    rows = [(s.offset, s.gain, s.remaining_lag) for s in model.sensors.values()]
     return Calibration(*map(jnp.stack, zip(*rows)))
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ...recordings import Recording
-from ...recordings.against_model import size_of, state_at
+from ...recordings.against_model import state_at
 from ...recordings.cut import Drive, padded, saturated
-from ..engine import DriveState, Input, Model
+from ..engine import DriveState, Input, measured_components, Model, state_size
 
 
 # Integration steps per oscillation: the classical Runge-Kutta method then follows a
@@ -49,24 +49,20 @@ def record_of(
     its oscillation (s).
     """
     sensors = model.sensors
-    names = tuple(
-        name
-        for name, sensor in sensors.items()
-        if isinstance(sensor.observe, int) and not sensor.filtered
-    )
+    components = measured_components(model)
+    names = tuple(components)
     time, interval = recording.time, recording.interval
     columns = np.stack([recording[name] for name in names], axis=-1)
     hidden = [saturated(recording[name]) for name in names]
     known = np.isfinite(columns) & ~np.stack(hidden, axis=-1)
     columns = np.where(known, columns, 0.0)
-    picks = [sensors[name].observe for name in names]
+    picks = list(components.values())
     gains = np.array([float(sensors[name].gain) for name in names])
     offsets = np.array([float(sensors[name].offset) for name in names])
     seen = (columns - offsets) / gains
     rates = np.gradient(seen, interval, axis=0)
     system = model.system if drive is None else model.uniform(drive.phase, drive.speed)
-    size = size_of(system, {name: sensors[name].observe for name in sensors})
-    guess = state_at(system, picks, time, seen, rates, size)
+    guess = state_at(system, picks, time, seen, rates, state_size(model))
     substeps = int(np.clip(np.ceil(_STEPS * interval / period), 1, _MOST_SUBSTEPS))
     arrays = (columns, known, guess, *_drive(model, recording, drive))
     columns, known, guess, *moving = (jnp.asarray(padded(one)) for one in arrays)
@@ -80,7 +76,7 @@ def record_of(
         DriveState(*moving),
         names,
         substeps,
-        any(float(sensors[name].lag) != 0 for name in names),
+        any(float(sensors[name].remaining_lag) != 0 for name in names),
     )
 
 
@@ -101,11 +97,11 @@ def _drive(
 
 def readings_of(model: Model, record: Record, state, rate) -> Float[Array, " c"]:
     """Return the readings of the channels for a state and its rate of change."""
-    found = []
+    found, components = [], measured_components(model)
     for name in record.channels:
-        sensor = model.sensors[name]
-        value = state[sensor.observe]
+        sensor, place = model.sensors[name], components[name]
+        value = state[place]
         if record.lagged:
-            value = value - sensor.lag * rate[sensor.observe]
+            value = value - sensor.remaining_lag * rate[place]
         found.append(sensor.offset + sensor.gain * value)
     return jnp.stack(found)
