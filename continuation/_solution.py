@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._context import Context
-from ._point import Point, with_parameter
+from ._point import ORDINARY, Point, with_parameter
 from ._program import Corrected
 from .predictors import Station
 from .problem import AbstractProblem
@@ -79,7 +79,7 @@ def point_of(
         parameter=float(z[-1]),
         state=z[:-1],
         multipliers=multipliers,
-        stable=is_stable(problem, multipliers),
+        stable=is_stable(problem, multipliers) if kind in ORDINARY else None,
         tangent=np.asarray(at.tangent),
         scale=np.asarray(at.scale),
         step=float(current.step),
