@@ -5,10 +5,8 @@ import warnings
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 
 from jaxcam.hybrid import (
-    flow,
     HybridSystem,
     Settings,
     simulate,
@@ -16,7 +14,6 @@ from jaxcam.hybrid import (
     SwitchedSystem,
 )
 from jaxcam.hybrid.checks import check_start
-from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.hybrid.surface import gaps
 from jaxcam.parameters import as_arrays, real_array, VectorLike
@@ -25,6 +22,7 @@ from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
 
 from .._program import solve
 from .._settings import BranchSettings
+from ._period_map import fixed_by_flow
 from ._shooting import ImpactingOrbits
 
 
@@ -36,8 +34,6 @@ _SAME = 1e-7
 """Two motions are equal if they differ by less than this, relative to their size."""
 _SAME_TIME = 1e-9
 """Two times are equal if they differ by less than this fraction of the period."""
-_SHORT = 1e-6
-"""Fraction of a period over which the direction of the motion is computed."""
 _CLOSED = 1e-9
 """A gap below this, relative to its size, counts as closed."""
 
@@ -287,43 +283,11 @@ def _touches(system, state, t0, length) -> bool:
 
 def _by_flow(system, guess, length, number, t0, settings):
     """Return the orbit from Newton's method on the period map, or None and a reason."""
-    start, end = jnp.asarray(float(t0)), jnp.asarray(length)
-    state, found, success = _root(system, guess, start, end, settings, number == 0)
-    if not bool(success):
+    found = fixed_by_flow(system, guess, length, t0, settings, free=number == 0)
+    if found is None:
         return None, "it did not converge"
-    return _confirmed(system, state, float(t0), float(found), settings)
-
-
-@program
-def _root(system, guess, t0, length, settings, free: bool):
-    """Solve for the state, and for the period if it is `free`: the state then stays in
-    the plane through the guess that is perpendicular to the motion.
-    """
-    sizes = component_sizes(system, t0, guess, length)
-    # a component that remains zero has no size
-    sizes = jnp.where(sizes > 0, sizes, 1.0)
-
-    def after(x, duration):
-        return flow(system, x, t0, t0 + duration, settings=settings).state
-
-    normal = (after(guess, _SHORT * length) - guess) / sizes
-
-    def moved(y, _):
-        x = y[: len(sizes)] * sizes
-        duration = y[-1] * length if free else length
-        off = (after(x, duration) - x) / sizes
-        if not free:
-            return off
-        return jnp.append(off, jnp.dot(normal, (x - guess) / sizes) / _SHORT)
-
-    newton = optx.Newton(rtol=1e-9, atol=1e-9)
-    begin = guess / sizes
-    begin = jnp.append(begin, 1.0) if free else begin
-    found = optx.root_find(moved, newton, begin, max_steps=30, throw=False)
-    good = found.result == optx.RESULTS.successful
-    good = good & jnp.all(jnp.isfinite(found.value))
-    duration = found.value[-1] * length if free else length
-    return found.value[: len(sizes)] * sizes, duration, good & (duration > 0)
+    state, period = found
+    return _confirmed(system, state, float(t0), period, settings)
 
 
 def _at(equations: Shooting, u, system, t0):

@@ -15,6 +15,7 @@ from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import AnyArray
 from variational import Orbit
 
+from .._evaluation import AbstractAtOnce, Evaluation
 from .._parameter import as_jax
 from .._point import with_field
 from .._touch import Touch
@@ -28,13 +29,14 @@ from ._event_changes import (
     values_of_events,
 )
 from ._gap_grazing import touching
+from ._run_twice import shooting_twice
 
 
 # fraction of a period over which the direction of the motion is computed
 _SHORT = 1e-6
 
 
-class SingleShooting(AbstractProblem):
+class SingleShooting(AbstractAtOnce):
     """Periodic orbits whose events may change along a branch.
 
     The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or,
@@ -205,8 +207,13 @@ class SingleShooting(AbstractProblem):
         Returns:
             As for `AbstractProblem.seen`.
         """
+        times = self.times(u, parameters)
+        arrival = flow(parameters, self.state(u), *times, settings=self.settings)
+        found = self._observed(arrival, u, parameters)
+        return values_of_events(arrival), found
+
+    def _observed(self, arrival, u, parameters):
         x, (start, end) = self.state(u), self.times(u, parameters)
-        arrival = flow(parameters, x, start, end, settings=self.settings)
         found = {
             "period": end - start,
             "time": start,
@@ -215,7 +222,35 @@ class SingleShooting(AbstractProblem):
         }
         if self.periods:
             found["stroboscopic"] = self._stroboscopic(x, start, end, parameters)
-        return values_of_events(arrival), found
+        return found
+
+    def evaluated(self, u, p, parameters_at) -> Evaluation:
+        """Return all quantities, from one simulation with its derivatives.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            As for `AbstractAtOnce.evaluated`.
+        """
+
+        def closed(z):
+            u, parameters = z[:-1], parameters_at(z[-1])
+            times = self.times(u, parameters)
+            arrival = flow(parameters, self.state(u), *times, settings=self.settings)
+            end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
+            off = self.closing(end, u, parameters)
+            return off, (off, arrival)
+
+        whole, (off, arrival) = jax.jacfwd(closed, has_aux=True)(jnp.append(u, p))
+        parameters = parameters_at(p)
+        return Evaluation(
+            off,
+            whole,
+            self.linearisation(u, parameters, whole[:, :-1]),
+            values_of_events(arrival),
+            self._observed(arrival, u, parameters),
+        )
 
     def monitors(self) -> dict[str, Monitor]:
         return monitors_of_events()
@@ -294,18 +329,7 @@ class SingleShooting(AbstractProblem):
     def transition(self, point: Any, at: Any) -> Start | None:
         if point.kind != FLIP:
             return None
-        direction = flip_direction(at.linearisation)
-        state = np.asarray(point.state)
-        if self.periods:
-            twice = dataclasses.replace(self, periods=2 * self.periods)
-            return Start(twice, state, point.parameter, np.append(direction, 0.0))
-        u = jnp.asarray(state)
-        normal = self.normal / self._sizes(u, point.problem.parameters)
-        across = np.linalg.svd(np.asarray(normal)[None])[2][1:].T
-        twice = dataclasses.replace(self, turns=2 * self.turns)
-        state = np.append(state[:-1], 2 * state[-1])
-        tangent = np.concatenate([across @ direction, [0.0, 0.0]])
-        return Start(twice, state, point.parameter, tangent)
+        return shooting_twice(self, point, flip_direction(at.linearisation))
 
     @property
     def signature(self) -> str:
