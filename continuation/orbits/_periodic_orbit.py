@@ -15,7 +15,7 @@ from jaxcam.hybrid import (
 )
 from jaxcam.hybrid.checks import check_start
 from jaxcam.hybrid.sizes import component_sizes
-from jaxcam.hybrid.surface import gaps
+from jaxcam.hybrid.surface import gaps, rest_state
 from jaxcam.parameters import as_arrays, real_array, VectorLike
 from variational import Orbit, orbit_of
 from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
@@ -190,17 +190,10 @@ def _somewhere(system, t0):
         return np.asarray(run.at([float(t0)])[0])
     except ValueError:
         pass
-    state = jnp.zeros(n)
-    time = jnp.asarray(float(t0))
-    for _ in range(20):
-        gap = gaps(system, time, state)
-        if not gap.shape[0] or float(jnp.min(gap)) >= 0:
-            return np.asarray(state)
-        which = int(jnp.argmin(gap))
-        slope = jax.grad(lambda x, w=which: gaps(system, time, x)[w])
-        normal = slope(state)
-        state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
-    raise ValueError("no state with gap >= 0 was found; give a guess")
+    state = rest_state(system, t0, n)
+    if state is None:
+        raise ValueError("no state with gap >= 0 was found; give a guess")
+    return state
 
 
 def _dimension(system) -> int:
