@@ -12,11 +12,11 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
+from jaxcam.hybrid.newton import newton_at_once
 from jaxcam.hybrid.programs import program
 
 from ._context import Context
 from ._evaluation import AbstractAtOnce, Evaluation
-from ._newton import newton_at_once
 from ._padding import Padded
 from ._parameter import with_leaf
 from .problem import AbstractProblem

@@ -18,11 +18,10 @@ from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.hybrid.surface import gaps, rest_state
 from jaxcam.parameters import as_arrays, real_array, VectorLike
 from variational import Orbit, orbit_of
-from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
+from variational.orbits import fixed_by_flow, flown, gap_sizes, refuse, seed, Shooting
 
 from .._program import solve
 from .._settings import BranchSettings
-from ._period_map import fixed_by_flow
 from ._shooting import ImpactingOrbits
 
 
