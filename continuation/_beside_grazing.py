@@ -29,6 +29,13 @@ def ends(problem: AbstractProblem, name: str) -> bool:
     return name in monitors and monitors[name].ends
 
 
+def doubtful(problem: AbstractProblem, passed: list[tuple[str, Located]]) -> bool:
+    """Return whether the problem would change at a point that could not be located."""
+    return any(
+        ends(problem, name) and not located.converged for name, located in passed
+    )
+
+
 def passed_in_step(
     context: Context, current: Solution, following: Solution
 ) -> list[tuple[str, Located]]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ._begin import leave, solved_start
 from ._beside_grazing import (
+    doubtful,
     ends,
     middle_of,
     passed_in_step,
@@ -24,6 +25,7 @@ from ._passed import (
 )
 from ._point import Point, set_parameters, with_parameter
 from ._program import evaluate
+from ._restated import restated
 from ._resume import resumed
 from ._solution import (
     point_of,
@@ -190,7 +192,8 @@ class Run:
                 continue
             last = step / 2 < shortest
             if short and (leaps or (attempted.at is None and (failures or last))):
-                over = self._touch(current, step)
+                moved = restated(self.context, current, step)
+                over = self._touch(current, step) if moved is None else (moved, "")
                 if over is not None:
                     return over
             if attempted.at is not None:
@@ -198,8 +201,7 @@ class Run:
                     current, self.context.leaf, attempted.at, attempted.following
                 )
                 passed = passed_in_step(self.context, current, following)
-                doubt = self._doubt(current, passed)
-                if doubt and not last:
+                if doubtful(current.problem, passed) and not last:
                     # the step may have led to another branch
                     step /= 2
                     continue
@@ -232,13 +234,6 @@ class Run:
         return current._replace(problem=fresh)
 
     # Special points
-
-    def _doubt(self, current: Solution, passed: list[tuple[str, Located]]) -> bool:
-        """Return whether the branch would end at a point that could not be located."""
-        return any(
-            ends(current.problem, name) and not located.converged
-            for name, located in passed
-        )
 
     def _pass_events(self, current: Solution, chord, passed: list[tuple[str, Located]]):
         """Add special points to `pending`; if one of them ends the problem or the

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._context import Context
+from ._other_unknowns import AbstractRestated
 from ._point import ORDINARY, Point, with_parameter
 from ._program import Corrected
 from .predictors import Station
@@ -73,6 +74,9 @@ def point_of(
     at, problem = current.at, current.problem
     multipliers, why = eigenvalues_at(problem, context.leaf, at)
     z = np.asarray(at.z)
+    here, observed = with_parameter(problem, context.leaf, z[-1]), at.observed
+    if isinstance(here, AbstractRestated):
+        observed = here.stored(observed, z[:-1])
     return Point(
         label=label,
         kind=kind,
@@ -89,11 +93,11 @@ def point_of(
         reason=reason or why,
         coefficient=coefficient,
         criticality=criticality,
-        observed={k: np.asarray(v) for k, v in at.observed.items()},
+        observed={k: np.asarray(v) for k, v in observed.items()},
         tests=dict(current.tests),
         signature=problem.signature,
         parameters=varied(problem, z),
-        problem=with_parameter(problem, context.leaf, z[-1]),
+        problem=here,
         leaf=context.leaf,
     )
 

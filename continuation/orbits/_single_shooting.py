@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, HybridSystem, Settings, SwitchedSystem
-from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import AnyArray
 from variational import Orbit
 
 from .._evaluation import AbstractAtOnce, Evaluation
+from .._other_unknowns import AbstractRestated
 from .._parameter import as_jax
 from .._point import with_field
 from .._touch import Touch
@@ -29,14 +29,13 @@ from ._event_changes import (
     values_of_events,
 )
 from ._gap_grazing import touching
+from ._phase_condition import direction_of
 from ._run_twice import shooting_twice
+from ._shooting_signature import family_of, numbers_in
+from ._start_of_period import moved_start, sampled
 
 
-# fraction of a period over which the direction of the motion is computed
-_SHORT = 1e-6
-
-
-class SingleShooting(AbstractAtOnce):
+class SingleShooting(AbstractAtOnce, AbstractRestated):
     """Periodic orbits whose events may change along a branch.
 
     The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or,
@@ -86,6 +85,10 @@ class SingleShooting(AbstractAtOnce):
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     turns: int = eqx.field(static=True, default=1)
     """Number of times that an orbit without forcing is traversed: 2 after a flip."""
+    shift: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
+    """Time by which the start of the period is later (forcing periods), so that no
+    impact occurs there.
+    """
     passed: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
     """Number of grazings of constraints that the branch has passed."""
 
@@ -126,7 +129,8 @@ class SingleShooting(AbstractAtOnce):
         if not self.periods:
             return jnp.zeros(()), u[-1]
         period = jnp.asarray(parameters.period, dtype=jnp.float64)
-        return self.phase * period, (self.phase + self.periods) * period
+        start = self.phase + self.shift
+        return start * period, (start + self.periods) * period
 
     def state(self, u) -> Float[Array, " n"]:
         """Return the state among the unknowns, shape `(n,)`."""
@@ -299,6 +303,14 @@ class SingleShooting(AbstractAtOnce):
             return None
         return touching(self, context, at, reach)
 
+    def restated(self, leaf, z, before):
+        if not (self.may_touch and self.periods):
+            return None
+        return moved_start(self, leaf, z, before)
+
+    def stored(self, observed, u):
+        return sampled(self, observed, u) if float(self.shift) else observed
+
     def beyond(self) -> "SingleShooting":
         """Return the same problem for the orbits beyond a grazing.
 
@@ -310,13 +322,13 @@ class SingleShooting(AbstractAtOnce):
     @property
     def representation(self) -> Unique:
         """The representation of an orbit, whatever grazings its branch has passed."""
-        return Unique(f"single shooting periods {self.periods} turns {self.turns}")
+        return Unique(family_of(self))
 
     def refreshed(self, u, parameters) -> "SingleShooting":
         if self.periods:
             return self
         u = jnp.asarray(u)
-        normal = _direction(self, u, parameters)
+        normal = direction_of(self, u, parameters)
         # keep the sign of the normal, so that the test functions are continuous
         normal = jnp.where(normal @ self.normal < 0, -normal, normal)
         return dataclasses.replace(self, reference=u[:-1], normal=normal)
@@ -334,24 +346,10 @@ class SingleShooting(AbstractAtOnce):
     @property
     def signature(self) -> str:
         passed = int(self.passed)
-        words = f" grazings {passed}" if passed else ""
-        return self.representation.family + words
+        return family_of(self) + (f" grazings {passed}" if passed else "")
 
     def with_signature(self, signature: str) -> AbstractProblem:
-        words = signature.split()
-        if words[:2] != ["single", "shooting"] or len(words) not in (6, 8):
+        found = numbers_in(signature)
+        if found is None:
             return super().with_signature(signature)
-        passed = np.asarray(float(words[7]) if len(words) == 8 else 0.0)
-        periods, turns = int(words[3]), int(words[5])
-        return dataclasses.replace(self, periods=periods, turns=turns, passed=passed)
-
-
-@program
-def _direction(problem: SingleShooting, u, parameters) -> Float[Array, " n"]:
-    """Return the direction of the motion, relative to the sizes of the components."""
-    x, sizes = u[:-1], problem._sizes(u, parameters)
-    start = jnp.zeros(())
-    end = _SHORT * u[-1]
-    later = flow(parameters, x, start, end, settings=problem.settings).state
-    away = (later - x) / sizes
-    return away / jnp.linalg.norm(away)
+        return dataclasses.replace(self, **found)
