@@ -92,7 +92,7 @@ def _turn(system, values, where, guess, t0, length, settings, normal, free, give
     def equations(y, found):
         (by_state, _, by_length, _), after = found
         x, _ = unknowns(y)
-        matrix = by_state * sizes / sizes[:, None] - jnp.eye(n)
+        matrix = by_state * sizes[None] / sizes[:, None] - jnp.eye(n)
         matrix = jnp.column_stack([matrix, by_length * length / sizes])
         beside = jnp.dot(normal, (x - guess) / sizes) / _SHORT
         across = jnp.append(normal / _SHORT, 0.0)
