@@ -222,7 +222,10 @@ class Run:
                 if over is not None:
                     return over
             if last:
-                return None, (f"the step was halved down to {step:.1e}, but {refusal}")
+                reason = f"the step was halved down to {step:.1e}, but {refusal}"
+                if current.problem.may_touch:
+                    reason += "; no grazing of a constraint was found ahead"
+                return None, reason
             step /= 2
 
     def _with_fresh_references(self, current: Solution) -> Solution:
