@@ -89,7 +89,10 @@ def singular_after(
 
 
 def middle_of(context: Context, a: Solution, z: np.ndarray) -> Solution | None:
-    """Return the solution halfway between a solution and a special point z after it."""
+    """Return the solution halfway between a solution and a special point z after it.
+
+    The length of its next step is zero, because no step begins there.
+    """
     chord = z - a.at.z
     guess = a.at.z + chord / 2
     at = correct(a.problem, context, guess, chord / a.at.scale**2, chord)
@@ -97,7 +100,7 @@ def middle_of(context: Context, a: Solution, z: np.ndarray) -> Solution | None:
         return None
     length = float(np.linalg.norm((at.z - a.at.z) / a.at.scale))
     arclength = a.arclength + length
-    return solution_at(a.problem, context.leaf, at, a.step, arclength)
+    return solution_at(a.problem, context.leaf, at, 0.0, arclength)
 
 
 def _singular(context: Context, a: Solution, b: Solution) -> list[tuple[str, Located]]:

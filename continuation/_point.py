@@ -48,7 +48,7 @@ class Point:
     scale: np.ndarray
     """Scales used to measure lengths at this point, shape `(n+1,)`."""
     step: float
-    """Length of the next step."""
+    """Length of the next step; 0 at a point between two special points."""
     arclength: float
     """Arclength from the start."""
     iterations: int

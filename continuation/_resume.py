@@ -25,7 +25,9 @@ def resumed(
     # use the stored tangent and scale: the resumed branch must be bit-identical
     at = with_field(at, "tangent", np.asarray(start.tangent))
     at = with_field(at, "scale", np.asarray(start.scale))
+    # no step begins at a point between two special points
     before = [p for p in history if p.label < start.label]
+    before = [p for p in before if p.special or p.step > 0]
     trail = tuple(
         (np.append(p.state, p.parameter), p.tangent)
         for p in before

@@ -104,7 +104,7 @@ def test_fold_saddle_and_grazing_are_told_apart():
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_a_flip_between_a_grazing_and_the_next_point_is_located(direction):
+def test_a_flip_between_a_grazing_and_the_next_point_is_located(direction, tmp_path):
     """Beside the grazing, a multiplier passes -1 within one step on its way to minus
     infinity; amplitude to 1e-9 of the root of multiplier + 1 in closed form.
     """
@@ -145,6 +145,24 @@ def test_a_flip_between_a_grazing_and_the_next_point_is_located(direction):
     along = np.array([point.arclength for point in found.points])
     assert np.all(np.diff(along) > 0)
     assert flip.stable is None and graze.stable is None
+    if direction == 1:
+        return
+    # a run interrupted at the point between the two goes on as if it had not been
+    arguments = problem, start, "amplitude", bounds
+    file = tmp_path / "branch.jsonl"
+    for callbacks in ([lambda point: point.label == between.label], []):
+        resumed = continuation.branch(
+            *arguments,
+            settings=continuation.BranchSettings(step=0.05),
+            direction=direction,
+            out=file,
+            resume=True,
+            callbacks=callbacks,
+        )
+    assert len(resumed.points) == len(found.points)
+    for one, other in zip(resumed.points, found.points, strict=True):
+        assert one.kind == other.kind and one.parameter == other.parameter
+        np.testing.assert_array_equal(one.state, other.state)
 
 
 def test_motion_through_the_wall_is_refused():
