@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ._context import Context
-from ._passed import located_between, sign_changes
+from ._passed import located_between, sign_changes, Special, special_here
 from ._program import correct, Corrected, evaluate
 from ._solution import Solution, solution_at
 from .problem import AbstractProblem
@@ -58,6 +58,18 @@ def passed_in_step(
             kept.sort(key=lambda one: float((one[1].z - current.at.z) @ along))
             return [*kept, *passed[k:]]
     return passed
+
+
+def specials_between(
+    context: Context, current: Solution, following: Solution
+) -> list[Special]:
+    """Return the special points of the step, in the order in which they are passed."""
+    chord = following.at.z - current.at.z
+    found = [
+        special_here(context, current, chord, name, located)
+        for name, located in passed_in_step(context, current, following)
+    ]
+    return [special for special in found if special is not None]
 
 
 def singular_before(
