@@ -36,7 +36,7 @@ def fixed_by_flow(
     """
     settings = Settings() if settings is None else settings
     normal = jnp.zeros(len(guess))
-    start, end = jnp.asarray(float(t0)), jnp.asarray(float(length))
+    start, end = (jnp.asarray(float(time), jnp.float64) for time in (t0, length))
     if free:
         later = simulate(system, guess, t0, float(t0) + _SHORT * length)
         normal = (jnp.asarray(later.final) - guess) / _sizes(system, start, guess, end)
