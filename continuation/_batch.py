@@ -10,10 +10,10 @@ from jaxtyping import ArrayLike, Float, PyTree
 from jaxcam.parameters import VectorLike, Where
 
 from ._batch_run import Axes, BatchPlan, follow_lanes, REASONS
+from ._beside_grazing import specials_between
 from ._context import Context
 from ._follow import checked_bounds
 from ._parameter import as_arguments, leaf_of, pick_one
-from ._passed import specials_between
 from ._point import Branch, Point, set_parameters
 from ._program import Corrected
 from ._settings import as_traced, BranchSettings

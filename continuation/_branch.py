@@ -130,7 +130,7 @@ def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:
             "the same, or write to another file"
         )
     points = list(branch.points)
-    # special points after the last regular point are found again
-    while points and points[-1].special:
+    # special points after the last point at which a step begins are found again
+    while points and (points[-1].special or points[-1].step == 0):
         points.pop()
     return points

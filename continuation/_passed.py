@@ -150,16 +150,3 @@ def special_here(
     length = float(np.linalg.norm((located.z - current.at.z) / current.at.scale))
     following = Solution(problem, at, {}, current.step, current.arclength + length, ())
     return Special(following, kind, located, coefficient, words)
-
-
-def specials_between(
-    context: Context, current: Solution, following: Solution
-) -> list[Special]:
-    """Return the special points of the step, in the order in which they are passed."""
-    names = sign_changes(context, current, following)
-    chord = following.at.z - current.at.z
-    found = [
-        special_here(context, current, chord, name, located)
-        for name, located in located_between(context, current, following, names)
-    ]
-    return [special for special in found if special is not None]

@@ -40,15 +40,15 @@ class Point:
     """Eigenvalues of an equilibrium, or multipliers of a map or an orbit, shape `(k,)`.
     """
     stable: bool | None
-    """Whether the solution is stable; None if stability is not computed, or a
-    multiplier is not finite.
+    """Whether the solution is stable; None at special points, where stability is about
+    to change, and if stability is not computed or a multiplier is not finite.
     """
     tangent: np.ndarray
     """Direction of the branch in (state, parameter), shape `(n+1,)`."""
     scale: np.ndarray
     """Scales used to measure lengths at this point, shape `(n+1,)`."""
     step: float
-    """Length of the next step."""
+    """Length of the next step; 0 at a point between two special points."""
     arclength: float
     """Arclength from the start."""
     iterations: int
@@ -175,9 +175,9 @@ class Branch:
                 kind = point.kind + ("" if point.converged else " (not converged)")
                 notes = point.criticality or point.reason
                 at = [f"{value:.9g}" for value in values]
-                # at a special point, stability is about to change
-                word = "" if point.special else stability(point.stable)
-                rows.append((str(point.label), kind, *at, word, notes))
+                rows.append(
+                    (str(point.label), kind, *at, stability(point.stable), notes)
+                )
         headings = ("label", "kind", *names, "stability", "notes")
         return ShortTable(sentence, headings, rows, ("kind", "stability", "notes"))
 

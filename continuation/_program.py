@@ -12,9 +12,11 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
+from jaxcam.hybrid.newton import newton_at_once
 from jaxcam.hybrid.programs import program
 
 from ._context import Context
+from ._evaluation import AbstractAtOnce, Evaluation
 from ._padding import Padded
 from ._parameter import with_leaf
 from .problem import AbstractProblem
@@ -114,6 +116,9 @@ def correct_(
     batched.
     """
     scale = scale_at(problem, leaf, guess, width)
+    if isinstance(problem, AbstractAtOnce):
+        parts = scale, normal, old, width, tolerance, max_iterations, least_norm
+        return _at_once(problem, leaf, guess, given, *parts)
 
     def equations(y):
         g = residual_at(problem, leaf, y * scale) / scale[:-1]
@@ -128,6 +133,36 @@ def correct_(
     return _seen(problem, leaf, z, old, width, success | given, iterations)
 
 
+def _at_once(
+    problem, leaf, guess, given, scale, normal, old, width, tolerance, iterations,
+    least_norm,
+) -> Corrected:  # fmt: skip
+    """Return the same as `correct_` for a problem that is evaluated at once."""
+
+    def at(p):
+        return with_leaf(problem.parameters, leaf, p)
+
+    def evaluate(y):
+        # without rounding, if the guess is the solution
+        z = jnp.where(given, guess, y * scale)
+        return problem.evaluated(z[:-1], z[-1], at)
+
+    def equations(y, found):
+        value = found.residual / scale[:-1]
+        matrix = found.jacobian * scale[None, :] / scale[:-1, None]
+        if least_norm:
+            return value, matrix
+        plane = jnp.dot(normal * scale, y - guess / scale)
+        row = (normal * scale)[None]
+        return jnp.append(value, plane), jnp.concatenate([matrix, row])
+
+    start = guess / scale
+    solved = newton_at_once(evaluate, equations, start, tolerance, iterations, given)
+    z = jnp.where(given, guess, solved.y * scale)
+    success, found = solved.success | given, solved.found
+    return _corrected(problem, leaf, z, old, width, success, solved.iterations, found)
+
+
 def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
     """Evaluate all quantities at a point that is already a solution."""
     u, p = z[:-1], z[-1]
@@ -135,20 +170,28 @@ def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
     jacobian, linearisation = problem.derivatives(
         u, p, lambda p: with_leaf(problem.parameters, leaf, p)
     )
-    scale = scale_at(problem, leaf, z, width)
-    tangent, determinant = tangent_and_determinant(jacobian, scale, old)
     monitors, observed = problem.seen(u, parameters)
+    found = Evaluation(None, jacobian, linearisation, monitors, observed)
+    return _corrected(problem, leaf, z, old, width, success, iterations, found)
+
+
+def _corrected(
+    problem, leaf, z, old, width, success, iterations, found: Evaluation
+) -> Corrected:
+    scale = scale_at(problem, leaf, z, width)
+    jacobian = found.jacobian
+    tangent, determinant = tangent_and_determinant(jacobian, scale, old)
     return Corrected(
         z=z,
         success=jnp.asarray(success) & jnp.all(jnp.isfinite(jacobian)),
         iterations=jnp.asarray(iterations),
         jacobian=jacobian,
-        linearisation=linearisation,
+        linearisation=found.linearisation,
         tangent=tangent,
         determinant=determinant,
         scale=scale,
-        monitors=monitors,
-        observed=observed,
+        monitors=found.monitors,
+        observed=found.observed,
     )
 
 

@@ -6,21 +6,28 @@ from typing import Any
 import numpy as np
 
 from ._begin import leave, solved_start
+from ._beside_grazing import (
+    doubtful,
+    ends,
+    middle_of,
+    passed_in_step,
+    singular_after,
+    singular_before,
+)
 from ._closed import closed, Past
 from ._context import Context
 from ._joins import JOINS, joins
 from ._parameter import as_arguments, leaf_of
 from ._passed import (
     around_corner,
-    located_between,
     SHORT,
-    sign_changes,
     special_here,
 )
-from ._point import Point, set_parameters, with_field, with_parameter
+from ._point import Point, set_parameters, with_parameter
 from ._program import evaluate
+from ._restated import restated
+from ._resume import resumed
 from ._solution import (
-    changes_of,
     point_of,
     Solution,
     solution_after,
@@ -51,6 +58,8 @@ class Run:
         # special points at which the problem has changed
         self.changes: list[Point] = []
         self.past = Past(context.leaf)
+        # the special point just passed, if no regular point follows it yet
+        self.last: Solution | None = None
 
     # Beginning
 
@@ -66,7 +75,10 @@ class Run:
         is resumed.
         """
         if isinstance(start, Point):
-            return self._resumed(problem, start, history)
+            self.label = start.label
+            found = resumed(self.context, problem, start, history)
+            current, self.past, self.changes = found
+            return current
         p = start.parameter
         p = float(leaf_of(problem.parameters, self.context.leaf)) if p is None else p
         low, high = self.context.bounds
@@ -89,8 +101,12 @@ class Run:
                 at, step = leave(problem, context, z, start.tangent, step)
             else:
                 at = solved_start(problem, context, z, self.name, self.direction)
-            current = solution_at(problem, context.leaf, at, step, arclength)
-            point = self._point(current, kind, "" if start.kind else start.reason)
+            reached = arclength
+            if kind == "regular":
+                reached += float(np.linalg.norm((at.z - z) / at.scale))
+            current = solution_at(problem, context.leaf, at, step, reached)
+            reason = "" if start.kind else start.reason
+            point = self._point(current, kind, reason)
             refusal = current.problem.check(point)
             if refusal is None:
                 break
@@ -99,35 +115,23 @@ class Run:
                 raise ValueError(f"the start is not admissible: {refusal}")
             # the rejected point must not use up a label
             self.label -= 1
+        if kind == "regular":
+            # the special points between z and this point come before it
+            self.label -= 1
+            self._pass_first(problem, z, current)
+            point = self._point(current, kind, reason)
         self.pending.append(point)
         self.past.add(problem, point)
         return self._with_fresh_references(current)._replace(yielded=True)
 
-    def _resumed(self, problem: AbstractProblem, start: Point, history) -> Solution:
-        context = self.context
-        z = np.append(start.state, start.parameter)
-        problem = with_parameter(problem, context.leaf, z[-1])
-        problem = problem.refreshed(z[:-1], problem.parameters)
-        at = evaluate(problem, context, z, start.tangent)
-        # use the stored tangent and scale: the resumed branch must be bit-identical
-        at = with_field(at, "tangent", np.asarray(start.tangent))
-        at = with_field(at, "scale", np.asarray(start.scale))
-        passed = [p for p in history if not p.special and p.label < start.label]
-        passed = [p for p in passed if p.signature == start.signature]
-        trail = tuple((np.append(p.state, p.parameter), p.tangent) for p in passed)
-        self.label = start.label
-        current = solution_at(
-            problem, context.leaf, at, start.step, start.arclength, trail
-        )
-        known = [*(p for p in history if p.label < start.label), start]
-        for point in known:
-            if not point.special:
-                before = problem
-                if point.signature != problem.signature:
-                    before = problem.with_signature(point.signature)
-                self.past.add(before, point)
-        self.changes = changes_of(known)
-        return current
+    def _pass_first(self, problem: AbstractProblem, z, following: Solution) -> None:
+        """Add the folds and flips between z, at which a problem begins, and the first
+        point of its branch to `pending`.
+        """
+        found = singular_after(self.context, problem, z, following)
+        if found is not None:
+            self.last, passed = found
+            self._pass_events(self.last, following.at.z - z, passed)
 
     # Stepping
 
@@ -147,6 +151,7 @@ class Run:
                 )
                 return
             count += 1
+            self.last = None
             following, reason = self._advance(current)
             yield from self._flush()
             if following is None:
@@ -187,21 +192,21 @@ class Run:
                 continue
             last = step / 2 < shortest
             if short and (leaps or (attempted.at is None and (failures or last))):
-                over = self._touch(current, step)
+                moved = restated(self.context, current, step)
+                over = self._touch(current, step) if moved is None else (moved, "")
                 if over is not None:
                     return over
             if attempted.at is not None:
                 following = solution_after(
                     current, self.context.leaf, attempted.at, attempted.following
                 )
-                names = sign_changes(self.context, current, following)
-                passed = located_between(self.context, current, following, names)
-                doubt = self._doubt(current, passed)
-                if doubt and not last:
+                passed = passed_in_step(self.context, current, following)
+                if doubtful(current.problem, passed) and not last:
                     # the step may have led to another branch
                     step /= 2
                     continue
-                over = self._pass_events(current, following, passed)
+                chord = following.at.z - current.at.z
+                over = self._pass_events(current, chord, passed)
                 if over is not None:
                     return over
                 refusal = self._refusal(following)
@@ -217,7 +222,10 @@ class Run:
                 if over is not None:
                     return over
             if last:
-                return None, (f"the step was halved down to {step:.1e}, but {refusal}")
+                reason = f"the step was halved down to {step:.1e}, but {refusal}"
+                if current.problem.may_touch:
+                    reason += "; no grazing of a constraint was found ahead"
+                return None, reason
             step /= 2
 
     def _with_fresh_references(self, current: Solution) -> Solution:
@@ -230,53 +238,41 @@ class Run:
 
     # Special points
 
-    def _doubt(self, current: Solution, passed: list[tuple[str, Located]]) -> bool:
-        """Return whether the branch would end at a point that could not be located."""
-        return any(
-            self._ends(current, name) and not located.converged
-            for name, located in passed
-        )
-
-    def _pass_events(
-        self, current: Solution, following: Solution, passed: list[tuple[str, Located]]
-    ):
+    def _pass_events(self, current: Solution, chord, passed: list[tuple[str, Located]]):
         """Add special points to `pending`; if one of them ends the problem or the
         branch, return the result of `_advance`, otherwise None.
         """
-        chord = following.at.z - current.at.z
         for name, located in passed:
-            found = self._special(current, chord, name, located)
-            if found is None:
+            special = special_here(self.context, current, chord, name, located)
+            if special is None:
                 continue
-            point, stood = found
-            self.pending.append(point)
-            if self._ends(current, name):
+            stood = special.current
+            point = self._add_special(
+                stood,
+                special.kind,
+                located.reason,
+                located.converged,
+                special.coefficient,
+                special.criticality,
+            )
+            if ends(current.problem, name):
                 return self._transition(current, point, stood)
             if joins(current, point):
                 return stood, JOINS
         return None
 
-    def _special(
-        self, current: Solution, chord, name: str, located: Located
-    ) -> tuple[Point, Solution] | None:
-        """Return the point and its solution; None if the zero is no special point."""
-        special = special_here(self.context, current, chord, name, located)
-        if special is None:
-            return None
-        point = self._point(
-            special.current,
-            special.kind,
-            located.reason,
-            located.converged,
-            special.coefficient,
-            special.criticality,
-        )
-        return point, special.current
-
-    @staticmethod
-    def _ends(current: Solution, name: str) -> bool:
-        monitors = current.problem.monitors()
-        return name in monitors and monitors[name].ends
+    def _add_special(self, stood: Solution, kind: str, *details) -> Point:
+        """Add a special point to `pending`, and a regular one between it and another
+        special point of the same problem just before it.
+        """
+        if self.last is not None:
+            middle = middle_of(self.context, self.last, stood.at.z)
+            if middle is not None:
+                self.pending.append(self._point(middle, "regular"))
+        point = self._point(stood, kind, *details)
+        self.pending.append(point)
+        self.last = stood
+        return point
 
     def _end_ahead(self, current: Solution, step: float):
         """Search for a zero of an ending monitor just ahead of a failed step."""
@@ -290,10 +286,11 @@ class Run:
             if located is None:
                 continue
             chord = 1.001 * (located.z - current.at.z)
-            found = self._special(current, chord, name, located)
-            if found is not None:
-                self.pending.append(found[0])
-                return self._transition(current, *found)
+            passed = singular_before(self.context, current, located.z, chord) or []
+            passed = [*passed, (name, located)]
+            over = self._pass_events(current, chord, passed)
+            if over is not None:
+                return over
         return None
 
     def _touch(self, current: Solution, step: float):
@@ -302,8 +299,10 @@ class Run:
         if found is None:
             return None
         touch, stood = found
-        point = self._point(stood, "grazing", touch.reason)
-        self.pending.append(point)
+        chord = stood.at.z - current.at.z
+        passed = singular_before(self.context, current, stood.at.z, chord) or []
+        self._pass_events(current, chord, passed)
+        point = self._add_special(stood, "grazing", touch.reason)
         if touch.start.tangent is None:
             return None, "grazing ends the branch; no orbit was found beyond it"
         return self._transition(current, point, stood, touch.start)

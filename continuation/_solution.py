@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ._context import Context
-from ._point import Point, with_parameter
+from ._other_unknowns import AbstractRestated
+from ._point import ORDINARY, Point, with_parameter
 from ._program import Corrected
 from .predictors import Station
 from .problem import AbstractProblem
@@ -73,13 +74,16 @@ def point_of(
     at, problem = current.at, current.problem
     multipliers, why = eigenvalues_at(problem, context.leaf, at)
     z = np.asarray(at.z)
+    here, observed = with_parameter(problem, context.leaf, z[-1]), at.observed
+    if isinstance(here, AbstractRestated):
+        observed = here.stored(observed, z[:-1])
     return Point(
         label=label,
         kind=kind,
         parameter=float(z[-1]),
         state=z[:-1],
         multipliers=multipliers,
-        stable=is_stable(problem, multipliers),
+        stable=is_stable(problem, multipliers) if kind in ORDINARY else None,
         tangent=np.asarray(at.tangent),
         scale=np.asarray(at.scale),
         step=float(current.step),
@@ -89,11 +93,11 @@ def point_of(
         reason=reason or why,
         coefficient=coefficient,
         criticality=criticality,
-        observed={k: np.asarray(v) for k, v in at.observed.items()},
+        observed={k: np.asarray(v) for k, v in observed.items()},
         tests=dict(current.tests),
         signature=problem.signature,
         parameters=varied(problem, z),
-        problem=with_parameter(problem, context.leaf, z[-1]),
+        problem=here,
         leaf=context.leaf,
     )
 

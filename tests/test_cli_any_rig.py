@@ -13,7 +13,9 @@ from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 from jaxcam.cli import _fit_result, app
+from jaxcam.cli._axis import Axis
 from jaxcam.cli._output import Output
+from jaxcam.cli._source import Source
 from jaxcam.data import DEMO_RIG
 from jaxcam.fitting._fit_result import Estimate
 
@@ -217,9 +219,44 @@ def test_a_driven_system_is_simulated_by_turns(rig):
     )
     assert found["t1"] == pytest.approx(2 * 2 * np.pi / 12)
     assert found["system"] == "TwoStops"
-    # no state in contact is known of it: the sentence names the option
-    asked = refusal("diagram", "--rig=two_stops.toml", "--from=11", "--to=12")
-    assert "give a state to start from, as in --state 0,0" in asked
+
+
+def test_a_rig_between_two_stops_starts_at_rest_or_as_its_file_states(rig):
+    """No state in contact is known of it; the units are those of the rig file."""
+    for kind in (".py", ".toml"):
+        shutil.copy(ROOT / "docs" / "rigs" / f"two_stops{kind}", rig)
+    text = (rig / "two_stops.toml").read_text()
+    line = ["simulate", "--set=speed=12", "--turns=2"]
+    at_rest = run(*line, "--rig=two_stops.toml")
+    assert "Start at rest: " in at_rest
+    given = run(*line, "--rig=two_stops.toml", "--state=0,0")
+    assert at_rest.splitlines()[-1] == given.splitlines()[-1]
+    (rig / "begun.toml").write_text("start = [0.0, 0.8]\n" + text)
+    begun = run(*line, "--rig=begun.toml")
+    assert "Start as the rig file states: " in begun and "0.8" in begun
+    stated = run(*line, "--rig=two_stops.toml", "--state=0,0.8")
+    assert begun.splitlines()[-1] == stated.splitlines()[-1]
+    (rig / "wrong.toml").write_text("start = [0.0]\n" + text)
+    assert "`start` must be [" in refusal(*line, "--rig=wrong.toml")
+    said = run(
+        *("diagram", "--rig=two_stops.toml", "--from=11", "--to=12", "--points=2"),
+        *("--turns=3", "--keep=1"),
+    )
+    assert "Start at rest: " in said
+
+
+def test_units_of_known_parameters_are_printed(rig):
+    """Of a parameter without a tolerance too, which is not fitted."""
+    text = (rig / "cart.toml").read_text()
+    text = text.replace("{value = 40.0, tolerance = 3.0,", "{value = 40.0,")
+    (rig / "known.toml").write_text(text)
+    units = Source(rig=rig / "known.toml").units()
+    assert units["stiffness"] == "1/s^2" and units["left"] == "m"
+    assert "restitution_left" not in units
+    axis = Axis.of("stiffness", "Cart", units)
+    assert axis.name == "stiffness in 1/s^2"
+    assert axis.shown(40.0) == "40 1/s^2"
+    assert Axis.of("restitution_left", "Cart", units).name == "restitution_left"
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 from textbook_systems import DampedImpactOscillator, parameters
 
 import continuation
@@ -21,8 +21,10 @@ C, D, E, W = 0.1, 1.0, 0.8, 1.0
 class Exact:
     """One impact a period; K, the flow over it, and the impact at speed v."""
 
-    period = 2 * np.pi / W
-    flow = expm(np.array([[0.0, 1.0], [-1.0, -C]]) * period)
+    def __init__(self, damping=C, omega=W):
+        self.c, self.w = damping, omega
+        self.period = 2 * np.pi / omega
+        self.flow = expm(np.array([[0.0, 1.0], [-1.0, -damping]]) * self.period)
 
     def forced(self, v):
         """The forced motion at the impact."""
@@ -30,25 +32,25 @@ class Exact:
         return np.linalg.solve(np.eye(2) - self.flow, moved)
 
     def amplitude(self, v):
-        p = self.forced(v)
-        return np.hypot(p[0], p[1] / W) * np.hypot(1 - W * W, C * W)
+        p, c, w = self.forced(v), self.c, self.w
+        return np.hypot(p[0], p[1] / w) * np.hypot(1 - w * w, c * w)
 
     def multipliers(self, v):
-        p = self.forced(v)
-        # acceleration of the forced motion is -W^2 p; the rest obeys the free equation
-        before = -(W**2) * p[0] - (D - p[0]) - C * (v - p[1])
-        after = -(W**2) * p[0] - (D - p[0]) - C * (-E * v - p[1])
+        p, c, w = self.forced(v), self.c, self.w
+        # acceleration of the forced motion is -w^2 p; the rest obeys the free equation
+        before = -(w**2) * p[0] - (D - p[0]) - c * (v - p[1])
+        after = -(w**2) * p[0] - (D - p[0]) - c * (-E * v - p[1])
         jump = np.array([[-E, 0.0], [(after + E * before) / v, -E]])
         return np.linalg.eigvals(self.flow @ jump)
 
     def start(self, v):
-        p = self.forced(v)
-        lag = np.angle(1 / (1 - W * W + 1j * C * W))
-        time = (np.angle(p[0] - 1j * p[1] / W) - lag) / W
+        p, c, w = self.forced(v), self.c, self.w
+        lag = np.angle(1 / (1 - w * w + 1j * c * w))
+        time = (np.angle(p[0] - 1j * p[1] / w) - lag) / w
         system = DampedImpactOscillator(
             **parameters(
-                omega=W,
-                damping=C,
+                omega=w,
+                damping=c,
                 stiffness=1.0,
                 amplitude=self.amplitude(v),
                 wall=D,
@@ -99,6 +101,68 @@ def test_fold_saddle_and_grazing_are_told_apart():
     for point in behind:
         assert point.signature.startswith("impacts -") and point.stable
         assert np.max(np.abs(point.state)) < D
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_flip_between_a_grazing_and_the_next_point_is_located(direction, tmp_path):
+    """Beside the grazing, a multiplier passes -1 within one step on its way to minus
+    infinity; amplitude to 1e-9 of the root of multiplier + 1 in closed form.
+    """
+    exact = Exact(0.9, 1.8)
+
+    def beyond_one(v):
+        return float(np.min(exact.multipliers(v).real)) + 1
+
+    speed: Any = brentq(beyond_one, 1e-3, 0.04, xtol=1e-14)
+    critical = exact.amplitude(speed)
+    grazing = D * np.hypot(1 - exact.w**2, exact.c * exact.w)
+    problem, start = exact.start(1.2 * speed)
+    bounds = 0.99 * grazing, 1.01 * grazing
+    if direction == 1:
+        system = eqx.tree_at(
+            lambda s: s.amplitude, problem.parameters, jnp.asarray(bounds[0])
+        )
+        problem, start = system, continuation.periodic_orbit(system)
+    found = continuation.branch(
+        problem,
+        start,
+        "amplitude",
+        bounds,
+        settings=continuation.BranchSettings(step=0.05),
+        direction=direction,
+    )
+    kinds = ["grazing", "flip"][::direction]
+    assert [point.kind for point in found.special] == kinds
+    (flip,), (graze,) = found.of_kind("flip"), found.of_kind("grazing")
+    assert flip.converged and abs(flip.parameter - critical) < 1e-9
+    assert abs(graze.parameter - grazing) < 1e-9
+    # a point between the two shows that the orbits there are unstable
+    (between,) = found.points[min(flip.label, graze.label) : -1][:1]
+    assert between.stable is False and min(between.multipliers.real) < -1
+    assert [point.label for point in found.points] == list(
+        range(1, len(found.points) + 1)
+    )
+    along = np.array([point.arclength for point in found.points])
+    assert np.all(np.diff(along) > 0)
+    assert flip.stable is None and graze.stable is None
+    if direction == 1:
+        return
+    # a run interrupted at the point between the two goes on as if it had not been
+    arguments = problem, start, "amplitude", bounds
+    file = tmp_path / "branch.jsonl"
+    for callbacks in ([lambda point: point.label == between.label], []):
+        resumed = continuation.branch(
+            *arguments,
+            settings=continuation.BranchSettings(step=0.05),
+            direction=direction,
+            out=file,
+            resume=True,
+            callbacks=callbacks,
+        )
+    assert len(resumed.points) == len(found.points)
+    for one, other in zip(resumed.points, found.points, strict=True):
+        assert one.kind == other.kind and one.parameter == other.parameter
+        np.testing.assert_array_equal(one.state, other.state)
 
 
 def test_motion_through_the_wall_is_refused():

@@ -7,6 +7,7 @@ import pytest
 
 import continuation
 import jaxcam
+from continuation._parameter import pick_one
 from continuation.orbits._event_changes import events_of, name_of_change
 from jaxcam.filippov.modes import surface_rates
 from jaxcam.hybrid import flow, Settings, SwitchedSystem
@@ -134,6 +135,104 @@ def test_a_branch_passes_the_grazing_of_a_rigid_stop_next_to_a_soft_one():
         assert found.points[-1].parameter == pytest.approx(bound)
     flips = [found.of_kind("flip")[0].parameter for found in (gains, loses)]
     assert flips[0] == pytest.approx(flips[1], abs=1e-9)
+
+
+def test_the_start_of_a_period_moves_away_from_an_impact():
+    """Unknowns on the same motion, to 1e-9; away from impacts, nothing is moved."""
+    settings = Settings(tolerance=1e-12)
+    system = as_arrays(TwoStops(wall=1.2))
+    period = float(system.period)
+    state = jaxcam.simulate(system, [0.0, 0.0], 0.0, 60 * period, settings=settings)
+    run = jaxcam.simulate(system, state.final, 0.0, period, settings=settings)
+    hits = np.asarray(run.impacts.time)[: int(run.impacts.count)]
+    assert len(hits)
+    one, leaf = jnp.ones(2), pick_one("wall", system)[0]
+    for early, moves in ((1e-3, True), (0.05, False)):
+        # nothing but the impact happens between these times
+        phase = float(hits[0]) / period - early
+        start = run.at(np.array([phase * period]))[0] if phase > 0 else None
+        assert start is not None
+        problem = continuation.SingleShooting(
+            system, jnp.asarray(phase), one, one, settings, 1
+        )
+        z = np.append(start, 1.2)
+        found = problem.restated(leaf, z, z)
+        assert (found is not None) == moves
+        if found is None:
+            continue
+        moved, there, chord = found
+        assert chord is not None and np.max(np.abs(chord)) == 0
+        begin, end = phase * period, (phase + float(moved.shift)) * period
+        later = jaxcam.simulate(system, start, begin, end, settings=settings).final
+        np.testing.assert_allclose(there[:-1], later, atol=1e-9)
+        again = problem.with_signature(moved.signature)
+        assert float(again.shift) == float(moved.shift)
+        assert moved.representation.family != problem.representation.family
+        # the states to store are those at the phase at which the branch began
+        stored = moved.stored({}, there[:-1])["stroboscopic"]
+        assert stored.shape == (1, 2)
+        np.testing.assert_allclose(
+            stored[0],
+            jaxcam.simulate(system, start, begin, begin + period).final,
+            atol=1e-7,
+        )
+
+
+class BeltWithStop(SwitchedSystem):
+    """A forced mass on a belt, with Stribeck friction, in front of a rigid stop."""
+
+    stop: float = 2.148
+    belt: float = 1.0
+
+    def switching(self, t, state):
+        return state[1] - self.belt
+
+    def branch(self, t, state, sides):
+        x, v = state
+        friction = 0.4 / (1.0 + 0.2 * sides[0] * (v - self.belt))
+        push = 0.9 * jnp.cos(0.7 * t) - sides[0] * friction
+        return jnp.stack([v, push - x - 0.1 * v])
+
+    def gap(self, t, state):
+        return self.stop - state[0]
+
+    def impact(self, t, state):
+        return state.at[1].multiply(-0.6)
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / 0.7
+
+
+@pytest.mark.slow
+def test_a_belt_oscillator_passes_the_grazing_of_its_stop():
+    """Grazing where the motion without the stop reaches it, to 1e-9; an impact passes
+    through the start of the period; the end is the motion to which simulations
+    converge, to 1e-8.
+    """
+    free, settings = BeltWithStop(stop=5.0), Settings(tolerance=1e-12)
+    period = float(free.period)
+    state = jaxcam.simulate(free, [0.0, 0.0], 0.0, 60 * period, settings=settings).final
+    run = jaxcam.simulate(free, state, 0.0, period, settings=settings)
+    times = np.linspace(0.0, period, 1001)
+    for _ in range(3):
+        highest = times[np.argmax(np.asarray(run.at(times))[:, 0])]
+        times = highest + (times - times[500]) / 100
+    grazes = float(run.at(np.array([highest]))[0, 0])
+
+    orbit = continuation.periodic_orbit(BeltWithStop(), state, periods=1)
+    found = continuation.branch(
+        BeltWithStop(), orbit, "stop", (1.9, 2.15), direction=-1
+    )
+    kinds = [p.kind for p in found.special]
+    assert kinds == ["grazing", "switching-sliding", "flip"]
+    assert found.special[0].parameter == pytest.approx(grazes, abs=1e-9)
+    last = found.points[-1]
+    assert last.parameter == pytest.approx(1.9) and "shift" in last.signature
+    settled = jaxcam.simulate(BeltWithStop(stop=1.9), [0.0, 0.0], 0.0, 100 * period)
+    np.testing.assert_allclose(
+        last.observed["stroboscopic"][0], settled.final, atol=1e-8
+    )
 
 
 def _sequence(*kinds):

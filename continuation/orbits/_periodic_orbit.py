@@ -5,10 +5,8 @@ import warnings
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 
 from jaxcam.hybrid import (
-    flow,
     HybridSystem,
     Settings,
     simulate,
@@ -16,12 +14,11 @@ from jaxcam.hybrid import (
     SwitchedSystem,
 )
 from jaxcam.hybrid.checks import check_start
-from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
-from jaxcam.hybrid.surface import gaps
+from jaxcam.hybrid.surface import gaps, rest_state
 from jaxcam.parameters import as_arrays, real_array, VectorLike
 from variational import Orbit, orbit_of
-from variational.orbits import flown, gap_sizes, refuse, seed, Shooting
+from variational.orbits import fixed_by_flow, flown, gap_sizes, refuse, seed, Shooting
 
 from .._program import solve
 from .._settings import BranchSettings
@@ -36,8 +33,6 @@ _SAME = 1e-7
 """Two motions are equal if they differ by less than this, relative to their size."""
 _SAME_TIME = 1e-9
 """Two times are equal if they differ by less than this fraction of the period."""
-_SHORT = 1e-6
-"""Fraction of a period over which the direction of the motion is computed."""
 _CLOSED = 1e-9
 """A gap below this, relative to its size, counts as closed."""
 
@@ -194,17 +189,10 @@ def _somewhere(system, t0):
         return np.asarray(run.at([float(t0)])[0])
     except ValueError:
         pass
-    state = jnp.zeros(n)
-    time = jnp.asarray(float(t0))
-    for _ in range(20):
-        gap = gaps(system, time, state)
-        if not gap.shape[0] or float(jnp.min(gap)) >= 0:
-            return np.asarray(state)
-        which = int(jnp.argmin(gap))
-        slope = jax.grad(lambda x, w=which: gaps(system, time, x)[w])
-        normal = slope(state)
-        state = state - 1.001 * gap[which] * normal / jnp.sum(normal * normal)
-    raise ValueError("no state with gap >= 0 was found; give a guess")
+    state = rest_state(system, t0, n)
+    if state is None:
+        raise ValueError("no state with gap >= 0 was found; give a guess")
+    return state
 
 
 def _dimension(system) -> int:
@@ -287,43 +275,11 @@ def _touches(system, state, t0, length) -> bool:
 
 def _by_flow(system, guess, length, number, t0, settings):
     """Return the orbit from Newton's method on the period map, or None and a reason."""
-    start, end = jnp.asarray(float(t0)), jnp.asarray(length)
-    state, found, success = _root(system, guess, start, end, settings, number == 0)
-    if not bool(success):
+    found = fixed_by_flow(system, guess, length, t0, settings, free=number == 0)
+    if found is None:
         return None, "it did not converge"
-    return _confirmed(system, state, float(t0), float(found), settings)
-
-
-@program
-def _root(system, guess, t0, length, settings, free: bool):
-    """Solve for the state, and for the period if it is `free`: the state then stays in
-    the plane through the guess that is perpendicular to the motion.
-    """
-    sizes = component_sizes(system, t0, guess, length)
-    # a component that remains zero has no size
-    sizes = jnp.where(sizes > 0, sizes, 1.0)
-
-    def after(x, duration):
-        return flow(system, x, t0, t0 + duration, settings=settings).state
-
-    normal = (after(guess, _SHORT * length) - guess) / sizes
-
-    def moved(y, _):
-        x = y[: len(sizes)] * sizes
-        duration = y[-1] * length if free else length
-        off = (after(x, duration) - x) / sizes
-        if not free:
-            return off
-        return jnp.append(off, jnp.dot(normal, (x - guess) / sizes) / _SHORT)
-
-    newton = optx.Newton(rtol=1e-9, atol=1e-9)
-    begin = guess / sizes
-    begin = jnp.append(begin, 1.0) if free else begin
-    found = optx.root_find(moved, newton, begin, max_steps=30, throw=False)
-    good = found.result == optx.RESULTS.successful
-    good = good & jnp.all(jnp.isfinite(found.value))
-    duration = found.value[-1] * length if free else length
-    return found.value[: len(sizes)] * sizes, duration, good & (duration > 0)
+    state, period = found
+    return _confirmed(system, state, float(t0), period, settings)
 
 
 def _at(equations: Shooting, u, system, t0):

@@ -1,9 +1,12 @@
 """Represent an orbit starting from another impact, or traversed twice."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+
+from ..problem import Start
 
 
 def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
@@ -28,6 +31,25 @@ def run_twice(problem: Any, u, deviation) -> tuple[np.ndarray, np.ndarray]:
     change[:, 0] /= 2
     rows[0, 0] = 2 * period
     return rows.ravel(), change.ravel()
+
+
+def shooting_twice(problem: Any, point: Any, direction: np.ndarray) -> Start:
+    """Return the start of the branch of orbits that repeat after two traversals.
+
+    **Arguments:** `problem`: a `SingleShooting`; `direction`: the direction of the
+    multiplier -1.
+    """
+    state = np.asarray(point.state)
+    if problem.periods:
+        twice = dataclasses.replace(problem, periods=2 * problem.periods)
+        return Start(twice, state, point.parameter, np.append(direction, 0.0))
+    sizes = np.asarray(problem.scale(state, point.problem.parameters))[:-1]
+    normal = np.asarray(problem.normal) / sizes
+    across = np.linalg.svd(normal[None])[2][1:].T
+    twice = dataclasses.replace(problem, turns=2 * problem.turns)
+    state = np.append(state[:-1], 2 * state[-1])
+    tangent = np.concatenate([across @ direction, [0.0, 0.0]])
+    return Start(twice, state, point.parameter, tangent)
 
 
 def rotations(

@@ -10,11 +10,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, HybridSystem, Settings, SwitchedSystem
-from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import AnyArray
 from variational import Orbit
 
+from .._evaluation import AbstractAtOnce, Evaluation
+from .._other_unknowns import AbstractRestated
 from .._parameter import as_jax
 from .._point import with_field
 from .._touch import Touch
@@ -28,13 +29,13 @@ from ._event_changes import (
     values_of_events,
 )
 from ._gap_grazing import touching
+from ._phase_condition import direction_of
+from ._run_twice import shooting_twice
+from ._shooting_signature import family_of, numbers_in
+from ._start_of_period import moved_start, sampled
 
 
-# fraction of a period over which the direction of the motion is computed
-_SHORT = 1e-6
-
-
-class SingleShooting(AbstractProblem):
+class SingleShooting(AbstractAtOnce, AbstractRestated):
     """Periodic orbits whose events may change along a branch.
 
     The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or,
@@ -84,6 +85,10 @@ class SingleShooting(AbstractProblem):
     """Number of forcing periods after which the orbit repeats; 0 without forcing."""
     turns: int = eqx.field(static=True, default=1)
     """Number of times that an orbit without forcing is traversed: 2 after a flip."""
+    shift: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
+    """Time by which the start of the period is later (forcing periods), so that no
+    impact occurs there.
+    """
     passed: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
     """Number of grazings of constraints that the branch has passed."""
 
@@ -124,7 +129,8 @@ class SingleShooting(AbstractProblem):
         if not self.periods:
             return jnp.zeros(()), u[-1]
         period = jnp.asarray(parameters.period, dtype=jnp.float64)
-        return self.phase * period, (self.phase + self.periods) * period
+        start = self.phase + self.shift
+        return start * period, (start + self.periods) * period
 
     def state(self, u) -> Float[Array, " n"]:
         """Return the state among the unknowns, shape `(n,)`."""
@@ -205,8 +211,13 @@ class SingleShooting(AbstractProblem):
         Returns:
             As for `AbstractProblem.seen`.
         """
+        times = self.times(u, parameters)
+        arrival = flow(parameters, self.state(u), *times, settings=self.settings)
+        found = self._observed(arrival, u, parameters)
+        return values_of_events(arrival), found
+
+    def _observed(self, arrival, u, parameters):
         x, (start, end) = self.state(u), self.times(u, parameters)
-        arrival = flow(parameters, x, start, end, settings=self.settings)
         found = {
             "period": end - start,
             "time": start,
@@ -215,7 +226,35 @@ class SingleShooting(AbstractProblem):
         }
         if self.periods:
             found["stroboscopic"] = self._stroboscopic(x, start, end, parameters)
-        return values_of_events(arrival), found
+        return found
+
+    def evaluated(self, u, p, parameters_at) -> Evaluation:
+        """Return all quantities, from one simulation with its derivatives.
+
+        Args:
+            u: Unknowns of the equations, shape `(u,)`.
+
+        Returns:
+            As for `AbstractAtOnce.evaluated`.
+        """
+
+        def closed(z):
+            u, parameters = z[:-1], parameters_at(z[-1])
+            times = self.times(u, parameters)
+            arrival = flow(parameters, self.state(u), *times, settings=self.settings)
+            end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
+            off = self.closing(end, u, parameters)
+            return off, (off, arrival)
+
+        whole, (off, arrival) = jax.jacfwd(closed, has_aux=True)(jnp.append(u, p))
+        parameters = parameters_at(p)
+        return Evaluation(
+            off,
+            whole,
+            self.linearisation(u, parameters, whole[:, :-1]),
+            values_of_events(arrival),
+            self._observed(arrival, u, parameters),
+        )
 
     def monitors(self) -> dict[str, Monitor]:
         return monitors_of_events()
@@ -264,6 +303,14 @@ class SingleShooting(AbstractProblem):
             return None
         return touching(self, context, at, reach)
 
+    def restated(self, leaf, z, before):
+        if not (self.may_touch and self.periods):
+            return None
+        return moved_start(self, leaf, z, before)
+
+    def stored(self, observed, u):
+        return sampled(self, observed, u) if float(self.shift) else observed
+
     def beyond(self) -> "SingleShooting":
         """Return the same problem for the orbits beyond a grazing.
 
@@ -275,13 +322,13 @@ class SingleShooting(AbstractProblem):
     @property
     def representation(self) -> Unique:
         """The representation of an orbit, whatever grazings its branch has passed."""
-        return Unique(f"single shooting periods {self.periods} turns {self.turns}")
+        return Unique(family_of(self))
 
     def refreshed(self, u, parameters) -> "SingleShooting":
         if self.periods:
             return self
         u = jnp.asarray(u)
-        normal = _direction(self, u, parameters)
+        normal = direction_of(self, u, parameters)
         # keep the sign of the normal, so that the test functions are continuous
         normal = jnp.where(normal @ self.normal < 0, -normal, normal)
         return dataclasses.replace(self, reference=u[:-1], normal=normal)
@@ -294,40 +341,15 @@ class SingleShooting(AbstractProblem):
     def transition(self, point: Any, at: Any) -> Start | None:
         if point.kind != FLIP:
             return None
-        direction = flip_direction(at.linearisation)
-        state = np.asarray(point.state)
-        if self.periods:
-            twice = dataclasses.replace(self, periods=2 * self.periods)
-            return Start(twice, state, point.parameter, np.append(direction, 0.0))
-        u = jnp.asarray(state)
-        normal = self.normal / self._sizes(u, point.problem.parameters)
-        across = np.linalg.svd(np.asarray(normal)[None])[2][1:].T
-        twice = dataclasses.replace(self, turns=2 * self.turns)
-        state = np.append(state[:-1], 2 * state[-1])
-        tangent = np.concatenate([across @ direction, [0.0, 0.0]])
-        return Start(twice, state, point.parameter, tangent)
+        return shooting_twice(self, point, flip_direction(at.linearisation))
 
     @property
     def signature(self) -> str:
         passed = int(self.passed)
-        words = f" grazings {passed}" if passed else ""
-        return self.representation.family + words
+        return family_of(self) + (f" grazings {passed}" if passed else "")
 
     def with_signature(self, signature: str) -> AbstractProblem:
-        words = signature.split()
-        if words[:2] != ["single", "shooting"] or len(words) not in (6, 8):
+        found = numbers_in(signature)
+        if found is None:
             return super().with_signature(signature)
-        passed = np.asarray(float(words[7]) if len(words) == 8 else 0.0)
-        periods, turns = int(words[3]), int(words[5])
-        return dataclasses.replace(self, periods=periods, turns=turns, passed=passed)
-
-
-@program
-def _direction(problem: SingleShooting, u, parameters) -> Float[Array, " n"]:
-    """Return the direction of the motion, relative to the sizes of the components."""
-    x, sizes = u[:-1], problem._sizes(u, parameters)
-    start = jnp.zeros(())
-    end = _SHORT * u[-1]
-    later = flow(parameters, x, start, end, settings=problem.settings).state
-    away = (later - x) / sizes
-    return away / jnp.linalg.norm(away)
+        return dataclasses.replace(self, **found)

@@ -38,8 +38,13 @@ class Axis(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the parameter in sentences and headings."""
-        return "speed in rpm" if self.in_rpm else self.parameter
+        """Name of the parameter in sentences and headings, with its unit if known."""
+        return f"{self.parameter} in {self.symbol}" if self.symbol else self.parameter
+
+    def shown(self, value: float) -> str:
+        """Return a value, given in SI units, in the unit of the command line."""
+        number = f"{value / self.unit:.6g}"
+        return f"{number} {self.symbol}" if self.symbol else number
 
     @property
     def label(self) -> tuple[str, str]:

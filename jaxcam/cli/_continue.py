@@ -67,7 +67,7 @@ def continue_(
         report("following the branch", None)
 
         def show(point) -> None:
-            report(f"{along.parameter} = {point.parameter / axis.unit:.6g}", None)
+            report(f"{along.parameter} = {axis.shown(point.parameter)}", None)
 
         branch = continuation.branch(
             start.problem,
@@ -85,7 +85,8 @@ def continue_(
         if out is not None:
             report("drawing", None)
             figures = [_draw(branch, model, axis, out)]
-    shown = ("speed (rpm)", 1 / axis.unit) if axis.in_rpm else None
+    name = f"{along.parameter} ({axis.symbol})"
+    shown = (name, 1 / axis.unit) if axis.symbol else None
     columns = _columns(model.state_names)
     output.print(continuation.table(branch, shown=shown, columns=columns))
     for point in branch.points:

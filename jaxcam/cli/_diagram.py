@@ -56,6 +56,7 @@ def diagram(
 
     from .. import sweeps
     from ._cache import keep_compiled_programs
+    from ._natural_start import natural_start
     from ._output import Output
     from ._parameters import make_model, parameters
     from ._progress import COMPILING, progress
@@ -64,7 +65,9 @@ def diagram(
     model = make_model(system, preset, None, source, set_)
     where.check_system(model)
     axis = Axis.of(sweep.parameter, system, source.units())
-    states = starts.states(sweep)
+    states, words = starts.states(sweep), ""
+    if source and states is None:
+        states, words = natural_start(model, source)
     looked = sweeps.ImpactSection(model) if sweep.section == "impacts" else model
     output = Output(json_file, out)
     with where.running() as running, progress(COMPILING) as report:
@@ -87,6 +90,8 @@ def diagram(
             report("drawing", None)
             figures = [_draw(made, axis, sweep.section, out)]
     ranges = made.ranges()
+    if words:
+        output.print(words)
     output.print(_table(ranges, axis))
     sentence = _sentence(system, made, axis, sweep)
     output.print(sentence)

@@ -101,7 +101,9 @@ class Starts:
     state: Annotated[
         str | None,
         typer.Option(
-            metavar="A,B", help="Initial state; default: a state in sustained contact."
+            metavar="A,B",
+            help="Initial state; default: the start in the rig file, a state in "
+            "sustained contact, or rest.",
         ),
     ] = None
     starts: Annotated[

@@ -40,6 +40,7 @@ def simulate(
     import jaxcam
 
     from ._cache import keep_compiled_programs
+    from ._natural_start import natural_start
     from ._output import Output
     from ._parameters import make_model
     from ._progress import COMPILING, progress
@@ -53,8 +54,10 @@ def simulate(
     )
 
     keep_compiled_programs()
-    start = run.start(system)
+    start, words = run.start(system), ""
     model = make_model(system, preset, speed, source, set_)
+    if source and run.state is None and start is None:
+        start, words = natural_start(model, source, run.t0)
     end = run.end(system, model)
     output = Output(json_file, out)
     with progress(COMPILING) as report:
@@ -73,6 +76,8 @@ def simulate(
             report("drawing", None)
             figures = draw(trajectory, out)
     sentence = summary(system, trajectory)
+    if words:
+        output.print(words)
     for table in (impact_table(trajectory), contact_table(trajectory)):
         if table is not None:
             output.print(table)

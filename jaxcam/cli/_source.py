@@ -3,13 +3,18 @@
 import dataclasses
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
+import numpy as np
 import typer
 
 from ..hybrid import HybridSystem
 from ._choices import CAM, choose, SYSTEMS
 from ._options import SavedSystem
+
+
+if TYPE_CHECKING:
+    from ..fitting import Setup
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,13 +63,21 @@ class Source:
 
     def units(self) -> dict[str, str]:
         """Return the units stated in the rig file, by parameter name."""
+        setup = self._setup()
+        return {} if setup is None else dict(setup.units)
+
+    def start(self) -> np.ndarray | None:
+        """Return the initial state stated in the rig file, or None."""
+        setup = self._setup()
+        return None if setup is None or not setup.start else np.array(setup.start)
+
+    def _setup(self) -> "Setup | None":
+        """Return the content of the rig file of a user's system, or None."""
         from ..fitting import is_setup, read_setup
 
         if self.rig is None or not is_setup(self.rig):
-            return {}
-        named = None if self.saved is None else str(self.saved)
-        found = read_setup(self.rig, named).parameters
-        return {one.name: one.unit for one in found if one.unit}
+            return None
+        return read_setup(self.rig, None if self.saved is None else str(self.saved))
 
     def name(self, word: str) -> str:
         """Return the name of the system: `word`, unless a file defines the system.

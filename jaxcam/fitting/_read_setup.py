@@ -29,6 +29,7 @@ _TABLES = (
     "input",
     "references",
     "records",
+    "start",
     *LAYOUT_KEYS,
 )
 
@@ -90,6 +91,8 @@ def read_setup(
         read_references(file, tables, None),
         _records(file, tables, made, {*fitted, *measured}),
         read_layout(file, tables),
+        {name: one.unit for name, one in given.items() if one.unit},
+        _start(file, tables, made),
     )
 
 
@@ -151,6 +154,18 @@ def _flat(section: Section, before: str) -> Iterator[tuple[str, Section, str]]:
             yield from _flat(inner, f"{name}.")
         else:
             yield name, section, key
+
+
+def _start(file: Path, tables, system: HybridSystem) -> tuple[float, ...]:
+    """Read the initial state; empty if there is none."""
+    if "start" not in tables:
+        return ()
+    row, names = tables["start"], system.state_names
+    section = Section(file, "start", {"start": {}})
+    if not isinstance(row, list) or len(row) != (len(names) or len(row)):
+        wanted = f"[{', '.join(names)}]" if names else "a list of numbers"
+        raise RigError(f"{file}: `start` must be {wanted}, in SI units; correct it.")
+    return tuple(section.as_number("start", value) for value in row)
 
 
 def _records(

@@ -46,6 +46,10 @@ class Setup:
     """
     files: FileLayout = FileLayout()
     """Column names and sampling rate of the recordings."""
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """Units of parameters, fitted or known, as stated in the rig file."""
+    start: tuple[float, ...] = ()
+    """Initial state of simulations; empty if the rig file does not give one."""
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -1,15 +1,15 @@
 """Draw bifurcation diagrams from continued branches."""
 
 from collections.abc import Callable, Iterable
-from itertools import groupby
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 from ._axes import figure_of, legend_above, one_axes
+from ._branch_lines import lines_of
+from ._clear_labels import Label, place_labels
 from ._style import FLIGHT, IMPACT, SECTION, styled
 from .labels import labelled
 
@@ -35,9 +35,6 @@ _SHORT = {
     "Neimark-Sacker": "NS",
     "interruption of chatter": "interruption",
 }
-# a label is omitted if it is closer than this to another one, horizontally and
-# vertically (points)
-_ROOM = 26, 11
 
 
 def mark_of(kind: str) -> tuple[str, str]:
@@ -64,6 +61,9 @@ def branch_diagram(
     """Draw branches, with stable parts solid, unstable parts dashed and special points
     marked.
 
+    The stability of a line is that of the points between the special points at its
+    ends, at which stability is undefined. Smooth curves connect the points.
+
     Args:
         branches: One or several branches from `continuation.branch`.
         ax: Axes to draw on; default: a new figure.
@@ -74,7 +74,7 @@ def branch_diagram(
         y_label: Name and unit of the y-axis.
         x_scale: Factor applied to the parameter (30/pi for a speed in rpm).
         letters: Whether to label the special points in addition to the legend; a label
-            that would overlap another is omitted.
+            that would cover a line, a marker or another label is omitted.
 
     Returns:
         The figure.
@@ -99,14 +99,10 @@ def branch_diagram(
     ax.set_xlabel(labelled(*((name, "") if x_label is None else x_label)))
     ax.set_ylabel(labelled(*y_label))
     ax.margins(x=0.03, y=0.08)
-    if letters:
-        _name(
-            ax,
-            [point for branch in several for point in branch.special],
-            value,
-            x_scale,
-        )
     legend_above(ax)
+    if letters:
+        special = [point for branch in several for point in branch.special]
+        place_labels(ax, _labels(special, value, x_scale))
     return figure_of(ax)
 
 
@@ -118,46 +114,22 @@ def _first_component(point) -> np.ndarray:
 
 
 def _draw(ax: Axes, branch, value, x_scale) -> None:
-    """Draw one line for each sequence of points with the same stability and
-    signature.
-    """
+    """Draw the lines of a branch."""
     points = [p for p in branch.points if p.converged]
-    before = None
-    kinds = [(p.signature, solid) for p, solid in zip(points, _solid(points))]
-    for (_, stable), group in groupby(zip(kinds, points), key=lambda one: one[0]):
-        run = [point for _, point in group]
-        rows = [np.atleast_1d(np.asarray(value(p), dtype=float)) for p in run]
-        width = len(rows[0])
-        # the lines of neighbouring sequences meet
-        if before is not None and len(before[1]) == width:
-            run, rows = [before[0], *run], [before[1], *rows]
-        before = (run[-1], rows[-1])
-        x = x_scale * np.array([p.parameter for p in run])
-        for column in np.array(rows).T:
+    rows = [np.atleast_1d(np.asarray(value(p), dtype=float)) for p in points]
+    words = {True: "stable", False: "unstable", None: "_unknown"}
+    for line in lines_of(points, rows):
+        dashed = line.stable is False
+        for column in line.values.T:
             ax.plot(
-                x,
+                x_scale * line.parameters,
                 column,
-                "-" if stable else "--",
+                "--" if dashed else "-",
                 color=FLIGHT,
-                linewidth=1.8 if stable else 1.1,
+                linewidth=1.1 if dashed else 1.8,
                 zorder=2,
-                label="stable" if stable else "unstable",
+                label=words[line.stable],
             )
-
-
-def _solid(points) -> list[bool]:
-    """Return which points belong to a solid line.
-
-    A point of unknown stability, such as a grazing orbit, belongs to the line of its
-    neighbours with the same signature.
-    """
-    found = [None if p.stable is None else bool(p.stable) for p in points]
-    for order in (range(1, len(points)), range(len(points) - 2, -1, -1)):
-        for k in order:
-            near = k - 1 if order.step > 0 else k + 1
-            if found[k] is None and points[k].signature == points[near].signature:
-                found[k] = found[near]
-    return [one is None or one for one in found]
 
 
 def _mark(ax: Axes, branch, value, x_scale) -> None:
@@ -177,28 +149,11 @@ def _mark(ax: Axes, branch, value, x_scale) -> None:
         )
 
 
-def _name(ax: Axes, points, value, x_scale) -> None:
-    """Write a label next to each marker, if there is room."""
-    # positions in the figure depend on the final axis limits
-    ax.autoscale_view()
-    taken: list[np.ndarray] = []
+def _labels(points, value, x_scale) -> list[Label]:
+    """Return a label for each special point."""
+    found = []
     for point in points:
         y = float(np.ravel(np.asarray(value(point), dtype=float))[0])
         place = (x_scale * point.parameter, y)
-        here = ax.transData.transform(place) * 72 / ax.figure.dpi
-        if any(np.all(np.abs(here - other) < _ROOM) for other in taken):
-            continue
-        taken.append(here)
-        left = ax.transAxes.inverted().transform(ax.transData.transform(place))[0] > 0.8
-        ax.annotate(
-            word_of(point.kind),
-            place,
-            xytext=(-5 if left else 5, 5),
-            textcoords="offset points",
-            ha="right" if left else "left",
-            fontsize="small",
-            color=mark_of(point.kind)[1],
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
-            # the label is drawn below the markers, because its halo would cover them
-            zorder=3,
-        )
+        found.append(Label(word_of(point.kind), place, mark_of(point.kind)[1]))
+    return found

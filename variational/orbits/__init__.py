@@ -6,6 +6,7 @@
 
 from ._admissible import inadmissible as inadmissible, refuse as refuse
 from ._at_grazing import multipliers_at_grazing as multipliers_at_grazing
+from ._builder import builder as builder, picked as picked
 from ._flight import flight_end as flight_end, flight_nodes as flight_nodes
 from ._gap_sizes import gap_sizes as gap_sizes
 from ._impact_orbit import (
@@ -40,6 +41,7 @@ from ._orbit import (
     Orbit as Orbit,
     orbit_of as orbit_of,
 )
+from ._period_map import fixed_by_flow as fixed_by_flow
 from ._seeds import seed as seed, steps_for as steps_for
 from ._shooting import PaddedShooting as PaddedShooting, Shooting as Shooting
 from ._shooting_equations import AbstractShooting as AbstractShooting, Seen as Seen
@@ -53,9 +55,7 @@ from ._special_points import (
     SpecialPoint as SpecialPoint,
 )
 from ._turn_derivative import (
-    builder as builder,
     by_product as by_product,
     flown as flown,
-    picked as picked,
     TurnDerivative as TurnDerivative,
 )

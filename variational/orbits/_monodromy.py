@@ -7,8 +7,9 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid import HybridSystem, Settings, SwitchedSystem
 from jaxcam.parameters import as_arrays, pick, Where
 
+from ._builder import picked
 from ._orbit import Orbit
-from ._turn_derivative import by_flow, by_product, picked, TurnDerivative
+from ._turn_derivative import by_flow, by_product, TurnDerivative
 
 
 Method = Literal["product", "flow"]

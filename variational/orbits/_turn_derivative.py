@@ -2,19 +2,17 @@
 motion.
 """
 
-from collections.abc import Callable
-
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxcam.hybrid import flow, Settings
+from jaxcam.hybrid import Settings
 from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import field_in_force
-from jaxcam.parameters import as_arrays, Pick
 
 from .._flight import fly_linearised
+from ._builder import builder
+from ._period_map import derivatives_by_flow
 from ._pieces import TurnPieces
 from ._product import product_of, with_all_constraints
 
@@ -44,26 +42,6 @@ class TurnDerivative(eqx.Module):
     """Whether there is sustained contact, which removes all memory of the past."""
 
 
-def picked(system, where: Pick | None) -> Float[Array, " q"]:
-    """Return the selected parameters as one vector."""
-    if where is None:
-        return jnp.zeros(0)
-    leaves = jax.tree.leaves(where(system))
-    return jnp.stack([jnp.asarray(leaf, dtype=jnp.float64) for leaf in leaves])
-
-
-def builder(system, where: Pick | None) -> Callable:
-    """Return the function that creates the prepared system from a parameter vector."""
-
-    def build(values):
-        if where is None:
-            return system.prepared()
-        numbers = [values[i] for i in range(values.shape[0])]
-        return where.replaced(system, *numbers).prepared()
-
-    return build
-
-
 @program
 def by_product(system, values, where, state, pieces: TurnPieces, sticks):
     n = state.shape[0]
@@ -89,7 +67,8 @@ def by_flow(
     system, values, where, state, t0, period, settings: Settings, sticks: bool
 ) -> TurnDerivative:
     """Differentiate the event loop and return the derivatives over one period."""
-    made = _by_flow(system, values, where, state, t0, period, as_arrays(settings))
+    what = values, where, state, t0, period, settings
+    made = derivatives_by_flow(system, *what)
     by_state, by_start, by_length, by_parameter = made
     return TurnDerivative(
         by_state,
@@ -100,16 +79,6 @@ def by_flow(
         jnp.asarray(jnp.nan),
         sticks,
     )
-
-
-@program
-def _by_flow(system, values, where, state, t0, period, settings):
-    build = builder(system, where)
-
-    def end(x, start, length, p):
-        return flow(build(p), x, start, start + length, settings=settings).state
-
-    return jax.jacfwd(end, argnums=(0, 1, 2, 3))(state, t0, period, values)
 
 
 @program

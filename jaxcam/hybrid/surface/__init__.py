@@ -53,6 +53,7 @@ from ._release_point import (
     release_point as release_point,
     ReleasePoint as ReleasePoint,
 )
+from ._rest_state import rest_state as rest_state
 from ._rounding import (
     forced_time as forced_time,
     gap_rounding as gap_rounding,
