@@ -380,7 +380,8 @@ def test_a_verdict_is_kept_if_no_recording_can_be_recommended(tmp_path, monkeypa
     def fails(*arguments):
         raise RecordingError("No flight occurs; give a higher speed.")
 
-    found = SimpleNamespace(to_json=lambda: {"verdict": "none"})
+    fitted = SimpleNamespace(problem=SimpleNamespace(segments=()))
+    found = SimpleNamespace(to_json=lambda: {"verdict": "none"}, after=fitted)
     monkeypatch.setattr(discrepancy, "diagnose", lambda *words, **options: found)
     # the package exports the command under the name of its module
     module = sys.modules["jaxcam.cli._diagnose"]

@@ -60,7 +60,8 @@ def _seen(model: Model):
     along = start + (jnp.arange(steps, dtype=float) + 0.5) * step, drive
     found = samples(model, nodes, calibration(model), start, step, place, along)
     time = start + step * (jnp.arange(steps, dtype=float)[:, None] + place)
-    return np.asarray(found).reshape(-1, 2), np.asarray(time).ravel()
+    columns = np.asarray(found).reshape(-1, 2).T
+    return dict(zip(model.sensors, columns)), np.asarray(time).ravel()
 
 
 @pytest.mark.parametrize("argument", list(ARGUMENTS))
@@ -72,16 +73,16 @@ def test_the_sensor_of_the_first_coordinate_shows_the_function_besides(argument)
     shown, _ = _seen(_model(term))
     turned = ImpactOscillator().period
     at = {
-        Variable.POSITION: bare[:, 1],
-        Variable.VELOCITY: bare[:, 0],
+        Variable.POSITION: bare["place"],
+        Variable.VELOCITY: bare["speed"],
         Variable.PHASE: 2 * np.pi * time / np.asarray(turned),
         Variable.TIME: time,
     }[argument]
     expected = np.array([float(term.at(x)) for x in at])
-    np.testing.assert_array_equal(shown[:, 0], bare[:, 0])
+    np.testing.assert_array_equal(shown["speed"], bare["speed"])
     assert np.max(np.abs(expected)) > 0.05
     # the velocity between two nodes is that of a cubic, to 1e-4
-    np.testing.assert_allclose(shown[:, 1] - bare[:, 1], expected, atol=2e-3)
+    np.testing.assert_allclose(shown["place"] - bare["place"], expected, atol=2e-3)
 
 
 def test_a_sensor_is_as_it_was_without_such_a_term():
