@@ -88,7 +88,9 @@ class Search:
         self.flyer = flyer
         self.nominal = np.array(flyer.values)
         spread = np.array([p.prior_stderr for p in parameters])
-        self.prior = np.diag((flyer.sizes / spread) ** 2).reshape(len(spread), len(spread))
+        # reshaped, because `diag` of no numbers has the wrong shape
+        prior = np.diag((flyer.sizes / spread) ** 2)
+        self.prior = prior.reshape(len(spread), len(spread))
         self.bounds = np.array([(p.lower, p.upper) for p in parameters]).reshape(-1, 2)
         self.information = self.prior
         self.count = gaps.shape[1]
