@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ...fitting import Input, Model, Parameter, Sensor, Turning
+from ...fitting.engine import state_channels, state_size
 from ...recordings import Recording
-from ...recordings.against_model import size_of
 from ..terms import Term
 
 
@@ -56,12 +56,12 @@ def usual_state(
     system, sensors: Mapping[str, Sensor], runs: Sequence[Recording]
 ) -> Float[np.ndarray, " n"]:
     """Return the median of each measured component of the state; zero for others."""
-    picks = {name: sensor.observe for name, sensor in sensors.items()}
-    state = np.zeros(size_of(system, picks))
-    for name, pick in picks.items():
-        if isinstance(pick, int):
+    model = Model(system, sensors)
+    state = np.zeros(state_size(model))
+    for name, observe in state_channels(model).items():
+        if isinstance(observe, int):
             samples = np.concatenate([run[name] for run in runs])
-            state[pick] = np.nanmedian(samples)
+            state[observe] = np.nanmedian(samples)
     return state
 
 

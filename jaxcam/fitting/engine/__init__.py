@@ -46,6 +46,7 @@ from ._model import (
     measured_components as measured_components,
     Model as Model,
     Sensor as Sensor,
+    state_channels as state_channels,
     Turning as Turning,
 )
 from ._modes import first_mode as first_mode, surfaces_in as surfaces_in
