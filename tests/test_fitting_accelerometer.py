@@ -109,6 +109,8 @@ def test_an_accelerometer_sharpens_a_fit(run):
     damping is known better than from the position alone (less than half the error)."""
     _, position = _fitted(run, "position_m")
     parts, both = _fitted(run, *SENSORS)
+    # although the other channel comes first in the alphabet
+    assert parts[0].channel == "position_m"
     assert parts[0].impacts.count > 5
     assert both.converged, both.message
     for one in both.estimates:

@@ -29,6 +29,7 @@ from .engine import (
     Model,
     Parameter,
     parameter_places,
+    primary_channel,
     state_size,
     with_constants,
 )
@@ -155,7 +156,7 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
 
 
 def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
-    primary = next(iter(model.sensors))
+    primary = primary_channel(model)
     if not len(shown.gaps):
         part = segment(recording, primary)
         return dataclasses.replace(part, drive=shown.drive)

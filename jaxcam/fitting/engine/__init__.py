@@ -45,6 +45,7 @@ from ._model import (
     Input as Input,
     measured_components as measured_components,
     Model as Model,
+    primary_channel as primary_channel,
     Sensor as Sensor,
     state_channels as state_channels,
     Turning as Turning,

@@ -290,6 +290,14 @@ def measured_components(model: Model) -> dict[str, int]:
     }
 
 
+def primary_channel(model: Model) -> str:
+    """Return the channel that shows the lowest component of the state that is measured,
+    or else the first channel.
+    """
+    measured = measured_components(model)
+    return min(measured or model.sensors, key=lambda name: measured.get(name, 0))
+
+
 def state_channels(model: Model) -> dict[str, int | Callable[[Array], Array]]:
     """Return the channels that depend on the state alone, and how."""
     return {
