@@ -10,9 +10,9 @@ from jaxtyping import ArrayLike, Float, PyTree
 from jaxcam.parameters import VectorLike, Where
 
 from ._batch_run import Axes, BatchPlan, follow_lanes, REASONS
-from ._beside_grazing import specials_between
 from ._context import Context
 from ._follow import checked_bounds
+from ._near_grazing import specials_between
 from ._parameter import as_arguments, leaf_of, pick_one
 from ._point import Branch, Point, set_parameters
 from ._program import Corrected

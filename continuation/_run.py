@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 
 from ._begin import leave, solved_start
-from ._beside_grazing import (
+from ._closed import closed, Past
+from ._context import Context
+from ._joins import JOINS, joins
+from ._near_grazing import (
     doubtful,
     ends,
     middle_of,
@@ -14,9 +17,6 @@ from ._beside_grazing import (
     singular_after,
     singular_before,
 )
-from ._closed import closed, Past
-from ._context import Context
-from ._joins import JOINS, joins
 from ._parameter import as_arguments, leaf_of
 from ._passed import (
     around_corner,
@@ -301,6 +301,7 @@ class Run:
         touch, stood = found
         chord = stood.at.z - current.at.z
         passed = singular_before(self.context, current, stood.at.z, chord) or []
+        # folds and flips neither end the branch nor join another one
         self._pass_events(current, chord, passed)
         point = self._add_special(stood, "grazing", touch.reason)
         if touch.start.tangent is None:

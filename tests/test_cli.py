@@ -160,19 +160,20 @@ def test_interrupted_run_says_so(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("out", "words"),
+    ("out", "resume", "words"),
     [
-        (None, "run the command again to finish."),
-        (Path("DIR"), "add --resume to go on from what is stored."),
+        (None, False, "run the command again to finish."),
+        (Path("DIR"), False, "add --resume to go on from what is stored."),
+        (Path("DIR"), True, "run it again to go on from what is stored."),
     ],
 )
-def test_interrupted_command_says_how_to_go_on(out, words, capsys):
+def test_interrupted_command_says_how_to_go_on(out, resume, words, capsys):
     @one_sentence
     def command(*, out, resume):
         raise KeyboardInterrupt
 
     with pytest.raises(typer.Exit):
-        command(out=out, resume=False)
+        command(out=out, resume=resume)
     assert capsys.readouterr().err.endswith(words + "\n")
 
 

@@ -1,5 +1,6 @@
-"""The fold beside a grazing, the saddle between them, and what comes behind."""
+"""The fold near a grazing, the saddle between them, and what comes behind."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import equinox as eqx
@@ -11,6 +12,9 @@ from scipy.optimize import brentq, minimize_scalar
 from textbook_systems import DampedImpactOscillator, parameters
 
 import continuation
+from continuation.orbits._start_of_period import sampled
+from jaxcam import simulate
+from jaxcam.hybrid import Settings
 from jaxcam.models import BouncingBall, ImpactOscillator
 from variational.orbits import lowest_times
 
@@ -240,3 +244,23 @@ def test_penetration_shorter_than_a_step_is_seen():
     )
     assert abs(float(time[0]) - t0 - inside.x) < 1e-6
     assert abs(float(value[0]) - inside.fun) < 1e-11
+
+
+@pytest.mark.parametrize("shift", [-0.3, 0.0, 0.3, 1.3])
+def test_states_keep_their_period_if_the_start_moves(shift):
+    """Row k is the state k periods after the first start, modulo two (1e-9)."""
+    system = ImpactOscillator(wall=9.0)
+    period = float(system.period)
+    times = (shift * period, (shift + 2) * period)
+    problem = SimpleNamespace(
+        parameters=system, periods=2, shift=shift, settings=Settings()
+    )
+    problem.times = lambda z, system: times
+    start = np.array([-0.3, 0.1])
+    rows = sampled(problem, {}, start)["stroboscopic"]
+    run = simulate(system, start, *times)
+    for k, row in enumerate(rows):
+        when = [m * period for m in (k - 2, k, k + 2, k + 4)]
+        (when,) = (t for t in when if times[0] < t <= times[1] + 1e-9)
+        expected = run.at(np.array([min(when, times[1])]))[0]
+        np.testing.assert_allclose(row, expected, atol=1e-9)

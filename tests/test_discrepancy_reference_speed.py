@@ -88,7 +88,9 @@ def test_the_law_is_drawn_over_the_approach_speeds(drops):
     rb = Parameter("rb", lambda m: m.system.terms[0].rb, 0.5)
     r0 = Parameter("restitution", lambda m: m.system.base.restitution, 0.15)
     law = Model(system_with_terms(Ball(), (term,)), _SENSORS)
-    before = fit(Problem.build(Model(Ball(), _SENSORS), drops, _PARAMETERS))
+    # a filter adds its state to those of the system
+    slow = {"height_m": Sensor(0, noise=_NOISE, bandwidth_hz=200.0)}
+    before = fit(Problem.build(Model(Ball(), slow), drops, _PARAMETERS))
     after = fit(Problem.build(law, drops, (r0, rb)))
     figure = restitution(plt, _Found(before, after))
     (axis,) = figure.axes

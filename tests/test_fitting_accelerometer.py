@@ -17,7 +17,7 @@ from jaxcam.fitting import (
     Sensor,
 )
 from jaxcam.hybrid import Wrapping
-from jaxcam.models import BilinearOscillator
+from jaxcam.models import BilinearOscillator, BouncingBall
 from jaxcam.recordings import record, Recording, RigError
 
 
@@ -147,6 +147,17 @@ def test_a_free_run_predicts_an_accelerometer():
     for name, sensor in SENSORS.items():
         off = found.residual(name)
         assert np.std(off[400:]) == pytest.approx(float(sensor.noise), rel=0.15)
+
+
+def test_a_recorded_accelerometer_feels_the_floor():
+    """A ball falls with -9.81 m/s^2 and rests on the floor with zero (1e-9)."""
+    sensors = {"acceleration_m_s2": Sensor(Output(1), noise=1e-12)}
+    run = record(
+        BouncingBall(), sensors, 6.0, rng=np.random.default_rng(0), state=[1.0, 0.0]
+    )
+    seen = run["acceleration_m_s2"]
+    np.testing.assert_allclose(seen[:100], -9.81, atol=1e-9)
+    np.testing.assert_allclose(seen[-100:], 0.0, atol=1e-9)
 
 
 RIG_FILE = """

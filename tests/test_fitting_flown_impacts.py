@@ -52,6 +52,25 @@ class Harvester(HybridSystem):
         return jnp.stack([hit, hit])
 
 
+class Coil(HybridSystem):
+    """The same with a voltage that the motion drives, but that does not act on it."""
+
+    state_names = ("displacement", "velocity", "voltage")
+
+    mechanics: Harvester = Harvester()
+
+    def vector_field(self, t, state):
+        motion = self.mechanics.vector_field(t, state[:2])
+        return jnp.append(motion, 2.0 * state[1] - 300.0 * state[2])
+
+    def gap(self, t, state):
+        return self.mechanics.gap(t, state[:2])
+
+    def impact(self, t, state):
+        after = self.mechanics.impact(t, state[:2])
+        return jnp.concatenate([after, jnp.full((2, 1), state[2])], axis=1)
+
+
 TRUTH = {"stiffness": 101000.0, "damping": 12.0, "amplitude": 35.0}
 MODEL = Model(Harvester(), {"displacement_m": Sensor(0, noise=NOISE)})
 FREE = (
@@ -151,6 +170,19 @@ def test_impacts_of_one_speed_show_no_law_of_the_speed(coarse):
     part, _ = coarse
     assert np.ptp(part.impacts.approach) < 0.1 * np.mean(part.impacts.approach)
     assert list(restitution_laws([part])) == ["constant"]
+
+
+def test_a_state_that_no_channel_shows_changes_nothing(coarse):
+    """The same impacts, to a thousandth of a sampling interval."""
+    part, _ = coarse
+    free = [
+        Parameter(one.name, Field(f"system.mechanics.{one.name}"), one.tolerance)
+        for one in FREE
+    ]
+    model = Model(Coil(), MODEL.sensors)
+    (other,) = segment_by_model(model, [part.recording], free)
+    off = other.impacts.time - part.impacts.time
+    assert np.max(np.abs(off)) < 1e-3 * part.recording.interval
 
 
 def test_a_fit_recovers_the_parameters(coarse):

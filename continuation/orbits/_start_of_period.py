@@ -62,7 +62,11 @@ def sampled(problem: Any, observed: dict[str, Any], u: np.ndarray) -> dict[str, 
     period = (end - start) / problem.periods
     first = start + (1 - float(problem.shift) % 1) * period
     times = first + period * np.arange(problem.periods)
-    return observed | {"stroboscopic": np.asarray(run.at(np.minimum(times, end)))}
+    states = np.asarray(run.at(np.minimum(times, end)))
+    # the first row remains the state at the phase and in the period of the first start
+    turned = int(np.floor(float(problem.shift))) + 1
+    states = np.roll(states, turned, axis=0)
+    return observed | {"stroboscopic": states}
 
 
 def _run(problem: Any, leaf: int | None, z: np.ndarray):

@@ -63,7 +63,8 @@ def one_sentence(command: Callable[_P, _R]) -> Callable[_P, _R]:
 def _interrupted(options: Mapping[str, object]) -> str:
     """Return how to finish an interrupted command, given its options."""
     if "resume" in options and options.get("out") is not None:
-        again = "add --resume to go on from what is stored"
+        added = "run it again" if options["resume"] else "add --resume"
+        again = f"{added} to go on from what is stored"
     else:
         again = "run the command again to finish"
     return f"Stopped by Ctrl-C before the end; {again}."

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from ..discrepancy import Diagnosis
 from ..discrepancy.terms import Where
 from ..fitting import Fit
+from ..fitting.engine import state_size
 from ..hybrid.surface import restitutions
 from ..plotting.colours import IMPACT
 from ..plotting.labels import labelled
@@ -55,8 +56,7 @@ def restitution(plt, found: Diagnosis):
         1, len(shown), figsize=(max(5.0, 3.8 * len(shown)), 3.2),
         layout="constrained", squeeze=False,
     )  # fmt: skip
-    segments = found.after.problem.segments
-    unit = unit_of(segments[0].channel)
+    unit = _unit(found)
     name = found.system().constraint_name
     for axis, gap in zip(axes.flat, shown):
         for law, color, line, label in zip(
@@ -75,12 +75,19 @@ def restitution(plt, found: Diagnosis):
             alpha=0.4, transform=axis.get_xaxis_transform(), label="recorded impacts",
         )  # fmt: skip
         axis.set_xlim(0, 1.02 * np.max(recorded[gap]))
-        axis.set_xlabel(labelled("approach speed", f"{unit}/s" if unit else ""))
+        axis.set_xlabel(labelled("approach speed", unit))
         if len(recorded) > 1:
             axis.set_title(name(gap))
     axes[0, 0].set_ylabel("coefficient of restitution")
     axes[0, 0].legend(fontsize="small")
     return figure
+
+
+def _unit(found: Diagnosis) -> str:
+    """Return the unit of the approach speeds, if all lengths have the same unit."""
+    units = {unit_of(channel) for channel in found.after.problem.model.sensors}
+    units = {unit for unit in units if "/" not in unit}
+    return f"{units.pop()}/s" if len(units) == 1 else ""
 
 
 def _speeds(found: Diagnosis) -> dict[int, Float[np.ndarray, " k"]]:
@@ -102,7 +109,9 @@ def _law(fit: Fit, along: Float[np.ndarray, " k"]) -> _Law:
         zero = jnp.zeros(())
         return jax.vmap(lambda one: restitutions(system, zero, state, one))(along)
 
-    given = fit.point.values[0], fit.problem.layout, fit.point.states[0, 0]
+    # without the states of sensor filters
+    state = fit.point.states[0, 0, : state_size(fit.problem.model)]
+    given = fit.point.values[0], fit.problem.layout, state
     value = eqx.filter_jit(law)(*given)
     slopes = eqx.filter_jit(eqx.filter_jacfwd(law))(*given)
     own = fit.problem.records[0]

@@ -56,7 +56,7 @@ def simulate(
     keep_compiled_programs()
     start, words = run.start(system), ""
     model = make_model(system, preset, speed, source, set_)
-    if source and run.state is None and start is None:
+    if source and run.state is None and (start is None or source.start() is not None):
         start, words = natural_start(model, source, run.t0)
     end = run.end(system, model)
     output = Output(json_file, out)

@@ -7,9 +7,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..hybrid import HybridSystem, simulate, SwitchedSystem, Wrapping
+from ..hybrid.surface import field_in_force, gaps
 from ._errors import RecordingError
 from ._recording import Recording
 
@@ -118,7 +119,8 @@ def record(
         name: Name of the recording.
 
     Returns:
-        A [`jaxcam.recordings.Recording`][].
+        A [`jaxcam.recordings.Recording`][]. An accelerometer shows the contact forces,
+            but not the shocks of impacts.
 
     Raises:
         RecordingError: The simulation stopped early.
@@ -159,13 +161,49 @@ def _sense(
     fine = interval / finer
     times = settle + fine * np.arange(count * finer) - float(sensor.lag)
     states = np.asarray(trajectory.at(np.maximum(times, trajectory.t0)))
-    read = jax.vmap(lambda t, x: sensor.seen(system, t, x))
-    seen = np.asarray(read(jnp.asarray(times), jnp.asarray(states)))
+    held = _in_contact(trajectory, times)
+
+    def read(t, state, held):
+        return sensor.seen(_Held(system, held), t, state)
+
+    seen = jax.vmap(read)(jnp.asarray(times), jnp.asarray(states), jnp.asarray(held))
+    seen = np.asarray(seen)
     if filtered:
         seen = _filtered(seen, 2 * np.pi * sensor.bandwidth_hz * fine)
     seen = float(sensor.offset) + float(sensor.gain) * seen[::finer]
     noisy = seen + float(sensor.noise) * rng.standard_normal(count)
     return np.clip(_round(noisy, sensor.resolution), -sensor.limit, sensor.limit)
+
+
+class _Held(Wrapping):
+    """A system whose vector field contains the contact forces."""
+
+    system: HybridSystem
+    contact: Bool[Array, " m"]
+
+    @property
+    def inner(self) -> HybridSystem:
+        return self.system
+
+    def vector_field(self, t, state):
+        return field_in_force(self.system, t, state, self.contact)
+
+    def gap(self, t, state):
+        return self.system.gap(t, state)
+
+    def impact(self, t, state):
+        return self.system.impact(t, state)
+
+
+def _in_contact(trajectory, times) -> Bool[np.ndarray, "k m"]:
+    """Return for each time whether each constraint is in contact."""
+    number = gaps(trajectory.system, trajectory.t0, trajectory.final).shape[0]
+    found = np.zeros((len(times), number), dtype=bool)
+    contacts = trajectory.contacts
+    for row in range(int(contacts.count)):
+        inside = (times >= contacts.start[row]) & (times < contacts.end[row])
+        found[inside, int(contacts.constraint[row])] = True
+    return found
 
 
 def _filtered(samples, step: float) -> np.ndarray:

@@ -36,13 +36,15 @@ def fixed_by_flow(
     """
     settings = Settings() if settings is None else settings
     normal = jnp.zeros(len(guess))
-    start, end = (jnp.asarray(float(time), jnp.float64) for time in (t0, length))
+    start, period = (jnp.asarray(float(time), jnp.float64) for time in (t0, length))
     if free:
-        later = simulate(system, guess, t0, float(t0) + _SHORT * length)
-        normal = (jnp.asarray(later.final) - guess) / _sizes(system, start, guess, end)
-    what = jnp.zeros(0), None, guess, start, end, as_arrays(settings), normal
-    state, period, success, _ = _turn(
-        system, *what, jnp.asarray(free), jnp.array(False)
+        short = float(t0) + _SHORT * length
+        later = simulate(system, guess, t0, short, settings=settings)
+        sizes = _sizes(system, start, guess, period)
+        normal = (jnp.asarray(later.final) - guess) / sizes
+    given = jnp.zeros(0), None, guess, start, period, as_arrays(settings), normal
+    state, period, success, _ = _over_period(
+        system, *given, jnp.asarray(free), jnp.array(False)
     )
     return (state, float(period)) if bool(success) else None
 
@@ -52,9 +54,10 @@ def derivatives_by_flow(system, values, where, state, t0, length, settings: Sett
     state, the start time, the period and the parameters `values`.
     """
     no = jnp.asarray(False)
-    start, end = (jnp.asarray(time, jnp.float64) for time in (t0, length))
-    what = values, where, state, start, end, as_arrays(settings), jnp.zeros(len(state))
-    *_, derivatives = _turn(system, *what, no, ~no)
+    start, period = (jnp.asarray(time, jnp.float64) for time in (t0, length))
+    normal = jnp.zeros(len(state))
+    given = values, where, state, start, period, as_arrays(settings), normal
+    *_, derivatives = _over_period(system, *given, no, ~no)
     return derivatives
 
 
@@ -65,7 +68,9 @@ def _sizes(system, t0, state, length):
 
 
 @program
-def _turn(system, values, where, guess, t0, length, settings, normal, free, given):
+def _over_period(
+    system, values, where, guess, t0, length, settings, normal, free, given
+):
     """Return the fixed point, the period, whether there is one, and the derivatives.
 
     **Arguments:** `free`: whether the period is unknown; `given`: whether the guess is
@@ -74,7 +79,7 @@ def _turn(system, values, where, guess, t0, length, settings, normal, free, give
     build, n = builder(system, where), guess.shape[0]
     sizes = _sizes(system, t0, guess, length)
 
-    def turn(x, start, duration, p):
+    def moved(x, start, duration, p):
         end = start + duration
         state = flow(build(p), x, start, end, settings=settings).state
         return state, state
@@ -86,7 +91,7 @@ def _turn(system, values, where, guess, t0, length, settings, normal, free, give
 
     def evaluate(y):
         x, duration = unknowns(y)
-        derivative = jax.jacfwd(turn, argnums=(0, 1, 2, 3), has_aux=True)
+        derivative = jax.jacfwd(moved, argnums=(0, 1, 2, 3), has_aux=True)
         return derivative(x, t0, duration, values)
 
     def equations(y, found):
@@ -94,10 +99,10 @@ def _turn(system, values, where, guess, t0, length, settings, normal, free, give
         x, _ = unknowns(y)
         matrix = by_state * sizes[None] / sizes[:, None] - jnp.eye(n)
         matrix = jnp.column_stack([matrix, by_length * length / sizes])
-        beside = jnp.dot(normal, (x - guess) / sizes) / _SHORT
+        off_plane = jnp.dot(normal, (x - guess) / sizes) / _SHORT
         across = jnp.append(normal / _SHORT, 0.0)
         fixed = jnp.zeros(n + 1).at[n].set(1.0)
-        value = jnp.append((after - x) / sizes, jnp.where(free, beside, 0.0))
+        value = jnp.append((after - x) / sizes, jnp.where(free, off_plane, 0.0))
         return value, jnp.vstack([matrix, jnp.where(free, across, fixed)])
 
     start = jnp.append(guess / sizes, 1.0)

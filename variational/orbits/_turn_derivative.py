@@ -67,8 +67,8 @@ def by_flow(
     system, values, where, state, t0, period, settings: Settings, sticks: bool
 ) -> TurnDerivative:
     """Differentiate the event loop and return the derivatives over one period."""
-    what = values, where, state, t0, period, settings
-    made = derivatives_by_flow(system, *what)
+    given = values, where, state, t0, period, settings
+    made = derivatives_by_flow(system, *given)
     by_state, by_start, by_length, by_parameter = made
     return TurnDerivative(
         by_state,

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from ...hybrid.programs import program
 from ._layout import Layout
@@ -21,6 +22,8 @@ JOINT = 1e-3
 # adds a negligible tenth to their variance, and removes the effects of chaos and of
 # small model errors
 _IMPACT = 10**-0.5
+# Relative information added to combinations that the samples do not determine
+_BLIND = 1e-12
 # Error of a joint, relative to that of a single piece, above which it counts as loose
 _LOOSE = 0.1
 _WIDTH = 4
@@ -175,9 +178,20 @@ def _variances(ss, before):
                 matrix[k - 1, :, k] = before[r, k].T
         flat = matrix.reshape(width * size, -1)
         scale = 1 / np.sqrt(np.diagonal(flat))
-        inverse = np.linalg.inv(flat * np.outer(scale, scale))
+        inverse = _inverse(flat * np.outer(scale, scale))
         found[r] = (np.diagonal(inverse) * scale**2).reshape(width, size)
     return np.abs(found)
+
+
+def _inverse(matrix: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
+    """Return the inverse of an information matrix with a unit diagonal. A combination
+    that the samples do not determine, such as a short flight behind a slow filter, has
+    a large variance.
+    """
+    try:
+        return np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        return np.linalg.inv(matrix + _BLIND * np.eye(len(matrix)))
 
 
 @program

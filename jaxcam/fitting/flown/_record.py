@@ -23,9 +23,9 @@ class Record(eqx.Module):
     """Samples `(k, c)` of the channels that show a component of the state, unfiltered.
 
     The arrays are padded, so that recordings of similar lengths share a program.
-    `drive` holds the motion of the
-    drive, or the level of the input, in the step after each sample. `guess` is the
-    state estimated from the samples around each of them, `(k, n)`.
+    `drive` holds the motion of the drive, or the level of the input, in the step after
+    each sample. `guess` is the state estimated from the samples around each of them,
+    `(k, n)`.
     """
 
     begin: Float[Array, ""]

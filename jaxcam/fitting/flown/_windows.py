@@ -220,7 +220,8 @@ def _inverse(matrix):
     """Return the inverse of the normal matrix of a state; a component that the samples
     do not determine keeps its value.
     """
-    scale = 1 / jnp.sqrt(jnp.maximum(jnp.diagonal(matrix), 1e-300))
+    size = jnp.diagonal(matrix)
+    scale = jnp.where(size > 0, 1 / jnp.sqrt(jnp.where(size > 0, size, 1.0)), 0.0)
     scales = jnp.outer(scale, scale)
     unit = jnp.eye(len(scale))
     return jnp.linalg.inv(matrix * scales + _BLIND * unit) * scales

@@ -20,7 +20,7 @@ from .special import FLIP, FOLD, Located
 
 # distances at which test functions without a limit are evaluated, relative to the
 # distance of the neighbouring point
-_BESIDE = (1e-3, 1e-2, 1e-1)
+_SHARES = (1e-3, 1e-2, 1e-1)
 
 
 def ends(problem: AbstractProblem, name: str) -> bool:
@@ -152,7 +152,7 @@ def _edge(
             return found
     hits: Any = other.at.observed.get("impacts")
     way = other.at.z - z
-    for share in _BESIDE:
+    for share in _SHARES:
         guess = z + share * way
         at = correct(problem, context, guess, way / other.at.scale**2, chord)
         if hits is not None and float(at.observed["impacts"]) != float(hits):
