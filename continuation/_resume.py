@@ -33,7 +33,9 @@ def resumed(
         for p in before
         if not p.special and p.signature == start.signature
     )
-    current = solution_at(problem, context.leaf, at, start.step, start.arclength, trail)
+    # a point between two special points has no step of its own
+    step = start.step or context.settings.step
+    current = solution_at(problem, context.leaf, at, step, start.arclength, trail)
     past, known = Past(context.leaf), [*before, start]
     for point in known:
         if not point.special:
