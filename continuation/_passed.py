@@ -32,7 +32,7 @@ SHORT = 1e-2
 """Longest step around a corner or past a grazing, relative to the initial step."""
 # distance from a special point at which the branch on either side of it is examined,
 # relative to the length of the step
-_BESIDE = 1e-3
+_NEAR = 1e-3
 
 
 def _unknowns(problem, context: Context, z: np.ndarray):
@@ -133,7 +133,7 @@ def special_here(
         at = with_field(at, "tangent", chord / np.linalg.norm(chord / at.scale))
     monitors, kind = problem.monitors(), name
     if name in monitors:
-        ends = [located.z + share * chord for share in (-_BESIDE, _BESIDE)]
+        ends = [located.z + share * chord for share in (-_NEAR, _NEAR)]
         if not located.converged:
             ends = [current.at.z, current.at.z + chord]
         sides = [_unknowns(problem, context, z) for z in ends]

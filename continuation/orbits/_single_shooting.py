@@ -156,8 +156,10 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         off = end - x
         if self.periods:
             return off
-        beside = jnp.dot(self.normal, (x - self.reference) / self._sizes(u, parameters))
-        return jnp.append(off, beside)
+        off_plane = jnp.dot(
+            self.normal, (x - self.reference) / self._sizes(u, parameters)
+        )
+        return jnp.append(off, off_plane)
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
         """Return the monodromy matrix or, without forcing, the derivative of the return

@@ -107,13 +107,13 @@ def _law(fit: Fit, along: Float[np.ndarray, " k"]) -> _Law:
         model = layout.at(values)
         system = model.system if drive is None else model.uniform(0.0, drive.speed)
         zero = jnp.zeros(())
-        return jax.vmap(lambda one: restitutions(system, zero, state, one))(along)
+        found = jax.vmap(lambda one: restitutions(system, zero, state, one))(along)
+        return found, found
 
     # without the states of sensor filters
     state = fit.point.states[0, 0, : state_size(fit.problem.model)]
     given = fit.point.values[0], fit.problem.layout, state
-    value = eqx.filter_jit(law)(*given)
-    slopes = eqx.filter_jit(eqx.filter_jacfwd(law))(*given)
+    slopes, value = eqx.filter_jit(jax.jacfwd(law, has_aux=True))(*given)
     own = fit.problem.records[0]
     rows = [k for k, one in enumerate(fit.estimates) if one.record in (None, own)]
     names = [one.name for one in fit.problem.parameters]

@@ -59,18 +59,6 @@ def located(
     model = jax.tree.map(
         lambda leaf: jnp.asarray(leaf) if isinstance(leaf, float) else leaf, model
     )
-    return _flown(model, parameters, recording, gaps, errors, drive, period)
-
-
-def _flown(
-    model: Model,
-    parameters: Sequence[Parameter],
-    recording: Recording,
-    gaps: Float[np.ndarray, "g k"],
-    errors: Float[np.ndarray, " g"],
-    drive: Drive | None,
-    period: float,
-) -> GivenImpacts:
     interval = recording.interval
     reach = max(_FEWEST, round(period / interval))
     margin = _MARGIN + reach // _SEARCHED
