@@ -1,5 +1,6 @@
 """Update the loop state after an attempted step, and choose the next step."""
 
+import functools
 from typing import Any, NamedTuple
 
 import jax
@@ -16,6 +17,7 @@ from ..codes import (
     TOGETHER,
 )
 from ..runge_kutta import Tableau, tableau_of
+from ._functions import Functions
 from ._gap_polynomial import end_curvature, Jet, time_to_contact, time_to_release
 from ._loop_state import closed, LoopState
 from ._release import CLOSE
@@ -170,12 +172,14 @@ class Attempt(NamedTuple):
     held: tuple
 
 
-def after_attempt(plan: Plan, carried: LoopState, attempt: Attempt) -> LoopState:
+def after_attempt(
+    functions: Functions, plan: Plan, carried: LoopState, attempt: Attempt
+) -> LoopState:
     """Return the loop state after an attempt."""
     active = carried.status == RUNNING
     good = attempt.good
     longest = _longest(plan, carried, attempt)
-    trial = _next_length(plan, carried, attempt, longest)
+    trial = _next_length(functions, plan, carried, attempt, longest)
     fixed = (good & attempt.begins) | (carried.completing & ~good) | attempt.locates
     # steps too short to advance the time also count as no progress
     moved = good & (attempt.t > carried.t)
@@ -246,7 +250,7 @@ def _longest(plan, carried, attempt):
     return jnp.minimum(jnp.minimum(longest, plan.longest_step), plan.t1 - carried.t + h)
 
 
-def _next_length(plan, carried, attempt, longest):
+def _next_length(functions, plan, carried, attempt, longest):
     """Return the step to the next contact or release, or the longest allowed step."""
     ahead = jnp.minimum(longest, 6.0 * carried.ramp)
     good, h = attempt.good, attempt.length
@@ -255,13 +259,12 @@ def _next_length(plan, carried, attempt, longest):
     inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
     flags = closed(attempt.mode, len(carried.held), len(carried.jets))
     for k, (jet, contact) in enumerate(zip(attempt.jets, flags, strict=True)):
-        ends = carried.jets[k], attempt.arrived[k]
-        flight = time_to_contact(jet, end_curvature(*ends, inverse))
-        held = jnp.minimum(time_to_release(*ends, inverse), plan.longest_step)
-        # a multiplier that is this close to zero without a release only touches zero
-        held = jnp.maximum(held, CLOSE * longest)
-        limit = jnp.where(contact, held, jnp.where(flight > 0, flight, jnp.inf))
-        ahead = jnp.minimum(ahead, limit)
+        parts = jet, carried.jets[k], attempt.arrived[k], inverse
+        flight = functions.where(~contact, functools.partial(_flight, *parts), jnp.inf)
+        ahead = jnp.minimum(ahead, flight)
+        if k < len(carried.held):
+            rest = functools.partial(_rest, plan, longest, *parts[1:])
+            ahead = jnp.minimum(ahead, functions.where(contact, rest, jnp.inf))
     again = jnp.where(attempt.fits, jnp.minimum(attempt.shorter, h), longest)
     again = jnp.where(attempt.settling, h, again)
     again = jnp.where(attempt.finite, again, 0.25 * h)
@@ -269,6 +272,21 @@ def _next_length(plan, carried, attempt, longest):
     known = (good & attempt.begins) | attempt.locates
     trial = jnp.where(known, attempt.fixed, trial)
     return jnp.where(carried.completing & ~good, carried.step, trial)
+
+
+def _flight(jet: Jet, left: Jet, right: Jet, inverse):
+    """Return the time to the next contact, by the jet after a step and those at the
+    ends of the step.
+    """
+    flight = time_to_contact(jet, end_curvature(left, right, inverse))
+    return jnp.where(flight > 0, flight, jnp.inf)
+
+
+def _rest(plan, longest, left: Jet, right: Jet, inverse):
+    """Return the time to the next release, by the jets at the ends of a step."""
+    held = jnp.minimum(time_to_release(left, right, inverse), plan.longest_step)
+    # a multiplier that is this close to zero without a release only touches zero
+    return jnp.maximum(held, CLOSE * longest)
 
 
 def _scale(carried, attempt) -> tuple:

@@ -45,6 +45,12 @@ class StepVerdict(NamedTuple):
     constraint: Any
 
 
+def no_event(h) -> StepVerdict:
+    """Return the outcome of a step of length `h` without an event."""
+    no = jnp.asarray(False)
+    return StepVerdict(no, jnp.full_like(h, jnp.inf), no, 0.0 * h, 0.0 * h)
+
+
 def judge(
     left: Jet,
     right: Jet,

@@ -7,6 +7,7 @@ each in its own mode, advance together. Step lengths carry no derivative, but ev
 times do.
 """
 
+import functools
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -15,7 +16,7 @@ from ..breakpoints import after
 from ..codes import RowKind, RUNNING
 from ._advance import after_attempt, Attempt, Plan
 from ._crossing import jumped_across, of_constraints, refreshed, stopped_by_impacts
-from ._flight import earliest, judge, StepVerdict
+from ._flight import earliest, judge, no_event, StepVerdict
 from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._jam import Jam, jam_of_step, jams_after
@@ -168,7 +169,7 @@ def _iterate(
         mode=mode,
         points=tuple(p & good & active for p in attempt.points),
     )
-    return after_attempt(plan, carried, attempt), record
+    return after_attempt(functions, plan, carried, attempt), record
 
 
 def _suppressed(carried: LoopState, judged: Judged) -> tuple:
@@ -194,22 +195,23 @@ def _judge_flights(
         # that follows may change the end of sliding
         m = len(carried.held)
         free[m:] = [f & ~carried.completing for f in free[m:]]
-    verdicts = [
-        _where_in_force(
-            free[k],
-            judge(
-                carried.jets[k],
-                jet,
-                h,
-                slack[k],
-                rounding[k],
-                carried.sizes[k],
-                end.room,
-                carried.longest,
-                calm=functions.counts is not None and k + 1 == len(jets),
-                where=functions.where,
-            ),
+
+    def verdict(k: int, jet: Jet) -> StepVerdict:
+        return judge(
+            carried.jets[k],
+            jet,
+            h,
+            slack[k],
+            rounding[k],
+            carried.sizes[k],
+            end.room,
+            carried.longest,
+            calm=functions.counts is not None and k + 1 == len(jets),
+            where=functions.where,
         )
+
+    verdicts = [
+        functions.where(free[k], functools.partial(verdict, k, jet), no_event(h))
         for k, jet in enumerate(jets)
     ]
     stops = stopped_by_impacts(functions, carried) if carried.crossed else []
@@ -243,8 +245,7 @@ def _judge_contacts(
     judged: Judged,
 ) -> StepVerdict:
     """Detect releases at the closed gaps."""
-    h, no = end.length, jnp.asarray(False)
-    none = StepVerdict(no, jnp.full_like(h, jnp.inf), no, 0.0 * h, 0.0 * h)
+    h, none = end.length, no_event(end.length)
     flags = carried.completing, carried.locating
 
     def verdict(k: int, tiny) -> StepVerdict:
@@ -345,8 +346,4 @@ def _where_passed(functions, plan, passed, t, x, mode, jets):
 
 
 def _where_in_force(condition, verdict):
-    return verdict._replace(
-        retake=verdict.retake & condition,
-        length=jnp.where(condition, verdict.length, jnp.inf),
-        lands=verdict.lands & condition,
-    )
+    return StepVerdict(*select(condition, verdict, no_event(verdict.length)))

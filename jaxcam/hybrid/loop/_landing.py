@@ -71,17 +71,13 @@ def land(
     """
     no = jnp.asarray(False)
     offset = jnp.where(lands, flown.offset, 0.0)
-    landed = taylor(made.x, made.rates, offset)
     t = end.t + offset
     seen = seen_from_inside(plan, end)(t)
-    after_each = functions.impact(seen, landed, carried.mode)
-    for k in functions.slidable:
-        # the end of sliding is not a crossing
-        row = functions.m + k
-        after_each[row] = select(carried.sliding[k], landed, after_each[row])
-    after = after_each[0]
-    for k in range(1, len(after_each)):
-        after = select(flown.constraint == k, after_each[k], after)
+    landed, after = functions.where(
+        lands,
+        lambda: _impact(functions, carried, made, flown.constraint, seen, offset),
+        (made.x, made.x),
+    )
     number = functions.m + functions.k
     hit = [lands & (flown.constraint == k) for k in range(number)]
     strikes = any_of(hit[: functions.m]) if functions.k else lands
@@ -144,6 +140,22 @@ def land(
         leaves=leaves,
         stuck=stuck,
     )
+
+
+def _impact(functions: Functions, carried, made: Step, constraint, t, offset):
+    """Return the states before and after the impact, or crossing, at the end of a
+    step.
+    """
+    before = taylor(made.x, made.rates, offset)
+    after_each = functions.impact(t, before, carried.mode)
+    for k in functions.slidable:
+        # the end of sliding is not a crossing
+        row = functions.m + k
+        after_each[row] = select(carried.sliding[k], before, after_each[row])
+    after = after_each[0]
+    for k in range(1, len(after_each)):
+        after = select(constraint == k, after_each[k], after)
+    return before, after
 
 
 def _jets_after(functions, carried, made, lands, t, x, mode):

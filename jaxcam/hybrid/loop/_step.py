@@ -14,7 +14,7 @@ from ._frame import Frame
 from ._functions import Functions
 from ._loop_state import LoopState
 from ._scale import error_allowed, error_norm, held_scales, scales
-from ._select import any_of, select
+from ._select import any_of
 
 
 class StepEnd(NamedTuple):
@@ -89,16 +89,9 @@ def make_step(
 ) -> Step:
     """Integrate the step to its `end`, in the current mode."""
     inside, h = seen_from_inside(plan, end), end.length
-    x, error, stages = step(
-        plan.tableau,
-        lambda t, x: functions.field(inside(t), x, carried.mode),
-        carried.t,
-        carried.x,
-        h,
-    )
+    x, error, pairs = _integrated(functions, plan, carried, inside, h)
     seen = inside(end.t)
     x, kicks = functions.settled(seen, x, carried.mode)
-    pairs = rates_among(carried.x, stages[0])
     frame = functions.frame(seen, x, carried.mode)
     scale = scales(carried.extents, carried.x, x, pairs, h, plan.per_run)
     if not functions.planar:
@@ -106,11 +99,6 @@ def make_step(
         scale = held_scales(scale, carried, frame.push, kicks, pairs, h)
     allowed = error_allowed(scale, carried.x, x, plan.tolerance, plan.absolute)
     effort = error_norm(error, allowed)
-    if functions.planar:
-        # the state in contact is found algebraically, and the old state is the guess
-        sticking = any_of(carried.contact)
-        x = select(sticking, carried.x, x)
-        effort = jnp.where(sticking, 0.0, effort)
     jets = functions.jets(seen, x, carried.mode)
     projected = functions.onto(frame, jets, x, carried.mode)
     # with surfaces, the rates at x are known from the jets, and differ very little from
@@ -118,3 +106,28 @@ def make_step(
     start = x if functions.k else projected
     rates = functions.taylor(seen, start, carried.mode)
     return Step(x, projected, jets, frame, rates, effort, scale)
+
+
+def _integrated(functions: Functions, plan: Plan, carried: LoopState, inside, h):
+    """Return the state after a step, the error estimate, and the components that are
+    rates of change of others.
+
+    The state of a planar system in contact is found algebraically, starting from the
+    old state.
+    """
+
+    def field(t, x):
+        return functions.field(inside(t), x, carried.mode)
+
+    def integrate():
+        return step(plan.tableau, field, carried.t, carried.x, h)
+
+    if not functions.planar:
+        x, error, stages = integrate()
+        return x, error, rates_among(carried.x, stages[0])
+    pairs = rates_among(carried.x, field(carried.t, carried.x))
+    unmoved = carried.x, tuple(0.0 * a for a in carried.x)
+    x, error = functions.where(
+        ~any_of(carried.contact), lambda: integrate()[:2], unmoved
+    )
+    return x, error, pairs
