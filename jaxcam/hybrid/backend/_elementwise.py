@@ -10,6 +10,7 @@ from typing import no_type_check
 import llvmlite.ir as ir
 import numpy as np
 
+from ._single import exp2_of_single, log2_of_single
 from ._special import (
     Arithmetic,
     exp,
@@ -90,7 +91,9 @@ def _of_doubles(w: Writer, name: str, dtype, x):
     if narrow:
         x = [b.fpext(v, w.with_kind(v, DOUBLE)) for v in x]
     a = Arithmetic(w)
-    if name == "exp":
+    if narrow and name in ("exp2", "log2"):
+        made = (exp2_of_single if name == "exp2" else log2_of_single)(w, x[0])
+    elif name == "exp":
         made = exp(w, x[0])
     elif name == "exp2":
         made = exp2(w, x[0])

@@ -73,6 +73,18 @@ class Arithmetic:
             total = self.add(self.mul(total, z), c)
         return total
 
+    def polynomial(self, coefficients, z):
+        """Return a polynomial with few sequential operations."""
+        terms = list(coefficients)
+        while len(terms) > 1:
+            pairs = [terms[i : i + 2] for i in range(0, len(terms), 2)]
+            terms = [
+                self.add(self.mul(pair[1], z), pair[0]) if len(pair) > 1 else pair[0]
+                for pair in pairs
+            ]
+            z = self.mul(z, z)
+        return terms[0]
+
     def less(self, a, b):
         return self.b.fcmp_ordered("<", *self._two(a, b))
 

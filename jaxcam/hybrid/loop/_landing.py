@@ -188,7 +188,7 @@ def _ending(
     hides = impact.rebound * impact.rebound <= low * _pull(jets, impact)
     ends = any_of(hit[: functions.m]) & (deep | hides)
     chatter = functions.where(
-        ends & may_rest(plan, impact, jets),
+        ends & may_rest(plan, impact, jets, hides),
         lambda: rest_of_chatter(
             functions, plan, impact, speeds, jets, mode, end.stop, rounding
         ),

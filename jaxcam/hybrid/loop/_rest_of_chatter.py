@@ -38,13 +38,25 @@ class Impact(NamedTuple):
     joins: Any
 
 
-def may_rest(plan, impact: Impact, jets):
-    """Return whether the chatter after an impact may be completed, without knowledge of
-    the coefficient of restitution, which is above -1.
+# margin of the test by the velocities of one impact: its ratio of velocities differs
+# from the coefficient of restitution in the limit of slow impacts
+_MARGIN = 1.5
+
+
+def may_rest(plan, impact: Impact, jets, hides):
+    """Return whether the chatter after an impact may be completed, by the velocities of
+    this impact instead of the coefficient of restitution, which is above -1.
+
+    **Arguments:** `hides` tells whether rounding hides the next flight, and thus the
+    ratio of the velocities.
     """
     a = of_constraint([j.acceleration for j in jets], impact.constraint)
     j = of_constraint([j.jerk for j in jets], impact.constraint)
-    small = impact.rebound * jnp.abs(j) <= 2 * plan.smallness * a * a
+    approach = jnp.where(impact.approach < 0, -impact.approach, 1.0)
+    # 1 - r, times the speed of approach
+    lost = _MARGIN * (approach - impact.rebound)
+    lost = jnp.where(hides | (lost > 2 * approach), 2 * approach, lost)
+    small = impact.rebound * jnp.abs(j) * approach <= plan.smallness * a * a * lost
     return (a < 0) & small & ~impact.several
 
 

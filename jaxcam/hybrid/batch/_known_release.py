@@ -1,0 +1,153 @@
+"""Skip contacts whose release is known from an earlier forcing period.
+
+In a planar system, time alone determines the state during contact. If the forcing is
+periodic, a contact that begins within an earlier contact, shifted by whole periods,
+therefore ends at the shifted release of that contact, in the same state. A release is
+used once a second contact has ended in the same way, which also guards against a
+`period` that is not one.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..codes import RowKind, RUNNING
+from ..loop import Functions, iteration, Jet, LoopState, Plan
+from ._layout import LaneLayout, LaneStart
+
+
+# two releases are the same if their times differ by less than this fraction of the
+# period, and their states by less than this fraction of the scale of the motion
+_SAME = 1e-8
+
+
+class Release(NamedTuple):
+    """The last contact that ended, and the motion after its release."""
+
+    # since when the current contact has lasted
+    began: Any
+    # the contact is known to last from `start` to `end` (s)
+    start: Any
+    end: Any
+    # state, acceleration and jerk of the gap, and first step
+    x: tuple
+    acceleration: Any
+    jerk: Any
+    step: Any
+    # whether the contact before it ended in the same way
+    confirmed: Any
+
+
+class LearningState(NamedTuple):
+    """The loop state, and the release of the last contact."""
+
+    state: LoopState
+    release: Release
+
+    @property
+    def x(self) -> tuple:
+        return self.state.x
+
+    @property
+    def status(self):
+        return self.state.status
+
+    @property
+    def steps(self):
+        return self.state.steps
+
+    @property
+    def stops(self):
+        return self.state.stops
+
+    @property
+    def impacts(self):
+        return self.state.impacts
+
+    @property
+    def chatters(self):
+        return self.state.chatters
+
+
+def learns(start: LaneStart) -> bool:
+    """Return whether the contacts of these batch elements can be skipped."""
+    _, plan = start.static
+    example = start.slots.rows
+    planar = len(example.x) == 2 and len(example.held) == len(example.jets) == 1
+    # an infinite period is static; any other is an array
+    return planar and plan.repeat is None and not plan.breaks
+
+
+def with_releases(start: LaneStart) -> LaneStart:
+    """Return the batch elements in `LearningState`s that know no release."""
+    state, kinds = start.slots
+    count = len(jax.tree.leaves(state))
+    number = np.dtype(float)
+    nothing = Release(np.inf, np.inf, np.inf, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+    values, structure = jax.tree.flatten(nothing)
+    rows = jax.tree.unflatten(structure, range(count, count + len(values)))
+    more = np.tile(np.array(values)[:, None], start.numbers.shape[1])
+    slots = LaneLayout(LearningState(state, rows), (*kinds, *[number] * len(values)))
+    return start._replace(slots=slots, numbers=np.concatenate([start.numbers, more]))
+
+
+def iteration_past_contacts(functions: Functions, plan: Plan, carried: LearningState):
+    """Take one attempted step; a contact whose release is known ends at once."""
+    state, record = iteration(functions, plan, carried.state)
+    release = _learnt(plan, carried.release, state, record)
+    (holds,) = state.contact
+    state = functions.where(
+        holds & (release.confirmed > 0), lambda: _skipped(plan, state, release), state
+    )
+    return LearningState(state, release), record
+
+
+def _learnt(plan: Plan, known: Release, state: LoopState, record) -> Release:
+    """Return the release after an attempt, which may have ended a contact."""
+    begins = record.kind == float(RowKind.CONTACT)
+    ends = record.kind == float(RowKind.RELEASE)
+    shift = plan.repeat * jnp.round((state.t - known.end) / plan.repeat)
+    same = jnp.abs(state.t - (known.end + shift)) <= _SAME * plan.repeat
+    for old, new, extent in zip(known.x, state.x, state.extents, strict=True):
+        same = same & (jnp.abs(new - old) <= _SAME * (jnp.abs(new) + extent))
+    # both contacts end at the same release, so the longer one contains the other
+    start = jnp.where(same, jnp.minimum(known.start + shift, known.began), known.began)
+    (jet,) = state.jets
+    new = Release(
+        began=jnp.inf,
+        start=start,
+        end=state.t,
+        x=state.x,
+        acceleration=jet.acceleration,
+        jerk=jet.jerk,
+        step=state.step,
+        confirmed=jnp.where(same, 1.0, 0.0),
+    )
+    found = jax.tree.map(lambda a, b: jnp.where(ends, a, b), new, known)
+    return found._replace(began=jnp.where(begins, state.t, found.began))
+
+
+def _skipped(plan: Plan, state: LoopState, release: Release) -> LoopState:
+    """Return the state after the release, if no stop comes before it."""
+    wait = jnp.where(state.completing, state.step, 0.0)
+    begin, period = state.t + wait, plan.repeat
+    shift = period * jnp.ceil((begin - release.end) / period)
+    t = release.end + shift
+    stop = jnp.minimum(plan.t0 + (state.stops + 1) * plan.stop_period, plan.t1)
+    inside = begin >= release.start + shift - _SAME * period
+    skips = inside & (t < stop) & (state.status == RUNNING)
+    zero, no = 0.0 * t, jnp.asarray(False)
+    after = state._replace(
+        t=t,
+        x=release.x,
+        mode=(no,),
+        jets=(Jet(zero, zero, release.acceleration, release.jerk),),
+        step=jnp.minimum(state.longest, release.step),
+        completing=no,
+        locating=no,
+        fastest=zero,
+        failures=zero,
+    )
+    return jax.tree.map(lambda a, b: jnp.where(skips, a, b), after, state)
