@@ -10,7 +10,7 @@ from typing import no_type_check
 import llvmlite.ir as ir
 import numpy as np
 
-from ._single import exp2_of_single, log2_of_single
+from ._single import SINGLE
 from ._special import (
     Arithmetic,
     exp,
@@ -91,16 +91,14 @@ def _of_doubles(w: Writer, name: str, dtype, x):
     if narrow:
         x = [b.fpext(v, w.with_kind(v, DOUBLE)) for v in x]
     a = Arithmetic(w)
-    if narrow and name in ("exp2", "log2"):
-        made = (exp2_of_single if name == "exp2" else log2_of_single)(w, x[0])
+    if narrow and name in SINGLE:
+        made = SINGLE[name](w, x[0])
     elif name == "exp":
         made = exp(w, x[0])
     elif name == "exp2":
         made = exp2(w, x[0])
     elif name == "log":
         made = log(w, x[0])
-    elif name == "log2":
-        made = a.div(log(w, x[0]), math.log(2.0))
     elif name == "logistic":
         made = a.div(1.0, a.add(exp(w, b.fneg(x[0])), 1.0))
     elif name == "rem":
@@ -292,7 +290,7 @@ ELEMENTWISE: frozenset[str] = (
     frozenset(
         """
     abs add add_any and ceil clamp convert_element_type div eq exp exp2 floor ge gt
-    integer_pow is_finite le le_to log log2 logistic lt lt_to max min mul ne neg not
+    integer_pow is_finite le le_to log logistic lt lt_to max min mul ne neg not
     or rem round rsqrt select_n shift_left shift_right_arithmetic
     shift_right_logical sign sqrt square sub xor
     """.split()

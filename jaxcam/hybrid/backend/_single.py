@@ -1,4 +1,4 @@
-"""Powers of two and logarithms of 32-bit floats, by polynomials in 64-bit arithmetic.
+"""Exponentials and logarithms of 32-bit floats, by polynomials in 64-bit arithmetic.
 
 The polynomials are minimax fits: their relative errors, 4e-9 (logarithm) and 2e-9
 (power), are small fractions of the 6e-8 of a 32-bit float. There is no division, and
@@ -9,6 +9,7 @@ from ._special import Arithmetic
 from ._writer import DOUBLE, INT64, Writer
 
 
+_LN2 = 0.6931471805599453
 # log2(1 + f) / f for sqrt(1/2) <= 1 + f < sqrt(2)
 _LOG2 = (
     1.4426950408299197,
@@ -36,21 +37,25 @@ _EXP2 = (
 _ROOT_HALF = 0x3FE6A09E << 32
 
 
-def log2_of_single(writer: Writer, x):
-    """Return the logarithm to base 2 of a 32-bit float, given and returned as a 64-bit
-    float.
-    """
+def log_of_single(writer: Writer, x):
+    """Return the logarithm of a 32-bit float, given and returned as a 64-bit float."""
     a = Arithmetic(writer)
     bits = a.bits(x)
     turns = a.b.ashr(a.b.sub(bits, writer.like(bits, _ROOT_HALF)), writer.like(bits, 52))
     mantissa = a.b.sub(bits, a.b.shl(turns, writer.like(bits, 52)))
     f = a.sub(a.from_bits(mantissa), 1.0)
     k = a.b.sitofp(turns, x.type)
-    made = a.add(k, a.mul(f, a.polynomial(_LOG2, f)))
+    made = a.mul(a.add(k, a.mul(f, a.polynomial(_LOG2, f))), _LN2)
     made = a.choose(a.equal(x, float("inf")), x, made)
     made = a.choose(a.equal(x, 0.0), float("-inf"), made)
     fine = a.b.fcmp_ordered(">=", x, writer.like(x, 0.0))
     return a.choose(fine, made, float("nan"))
+
+
+def exp_of_single(writer: Writer, x):
+    """Return e^x of a 32-bit float, given and returned as a 64-bit float."""
+    a = Arithmetic(writer)
+    return exp2_of_single(writer, a.mul(x, 1 / _LN2))
 
 
 def exp2_of_single(writer: Writer, x):
@@ -65,3 +70,7 @@ def exp2_of_single(writer: Writer, x):
     exponent = a.b.shl(whole, writer.like(whole, 52))
     scaled = a.b.bitcast(a.b.add(a.bits(made), exponent), writer.with_kind(x, DOUBLE))
     return a.choose(a.is_nan(x), x, scaled)
+
+
+# operations of 32-bit floats that are computed here
+SINGLE = {"exp": exp_of_single, "exp2": exp2_of_single, "log": log_of_single}

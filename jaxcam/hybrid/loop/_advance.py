@@ -232,7 +232,7 @@ def _longest(plan, carried, attempt):
     h, effort = attempt.length, attempt.effort
     # single precision is sufficient for choosing a step, and much cheaper
     rough = jnp.asarray(jnp.clip(effort, 1e-12, 1e12), dtype=jnp.float32)
-    rough = jnp.exp2(jnp.log2(rough) * jnp.float32(-1.0 / plan.tableau.order))
+    rough = jnp.exp(jnp.log(rough) * jnp.float32(-1.0 / plan.tableau.order))
     factor = jnp.clip(0.9 * jnp.asarray(rough, dtype=jnp.float64), 0.2, 6.0)
     factor = jnp.where(jnp.isfinite(effort), factor, 0.1)
     # a much shorter step contains no information about the longest one
@@ -254,6 +254,7 @@ def _next_length(functions, plan, carried, attempt, longest):
     """Return the step to the next contact or release, or the longest allowed step."""
     ahead = jnp.minimum(longest, 6.0 * carried.ramp)
     good, h = attempt.good, attempt.length
+    known = (good & attempt.begins) | attempt.locates
     # the step that completes a chatter does not follow the motion: its length is unused
     whole = (h > 0) & ~carried.completing
     inverse = jnp.where(whole, 1.0, 0.0) / jnp.where(whole, h, 1.0)
@@ -264,12 +265,11 @@ def _next_length(functions, plan, carried, attempt, longest):
         ahead = jnp.minimum(ahead, flight)
         if k < len(carried.held):
             rest = functools.partial(_rest, plan, longest, *parts[1:])
-            ahead = jnp.minimum(ahead, functions.where(contact, rest, jnp.inf))
+            ahead = jnp.minimum(ahead, functions.where(contact & ~known, rest, jnp.inf))
     again = jnp.where(attempt.fits, jnp.minimum(attempt.shorter, h), longest)
     again = jnp.where(attempt.settling, h, again)
     again = jnp.where(attempt.finite, again, 0.25 * h)
     trial = jnp.where(good, ahead, again)
-    known = (good & attempt.begins) | attempt.locates
     trial = jnp.where(known, attempt.fixed, trial)
     return jnp.where(carried.completing & ~good, carried.step, trial)
 

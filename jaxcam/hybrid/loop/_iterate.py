@@ -154,7 +154,7 @@ def _iterate(
         released=released,
         fastest=landing.fastest,
         fixed=jnp.where(locates, end.length + delay, chatter.duration),
-        blur=functions.blur(landing.seen, landing.x, carried.extents, landing.mode),
+        blur=landing.blur,
         held=_suppressed(carried, judged),
     )
     kind = row_kind(carried, lands, begins, released, stopped)

@@ -31,6 +31,8 @@ class Landing(NamedTuple):
     x: tuple
     mode: tuple
     jets: list
+    # rounding errors of the gaps, and of the distances from surfaces
+    blur: tuple
     # which constraints were hit, or which surface was crossed
     hit: list
     impact: Impact
@@ -94,7 +96,8 @@ def land(
     if functions.k:
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
         mode = mode + sides.negative + sides.sliding
-        jets = _jets_after(functions, carried, made, lands, seen, x, mode)
+        parts = plan, carried, made, end, lands
+        jets, _ = _jets_after(functions, *parts, (seen, x, mode))
         passed = past_surfaces(
             functions, carried, jets, hit, sides, approach, rounding, stops
         )
@@ -105,8 +108,10 @@ def land(
         if functions.m and functions.slidable:
             moved, _ = functions.settled(seen, x, mode)
             x = select(passed.passed_over, moved, x)
+        blur = functions.blur(seen, x, carried.extents, mode)
     else:
-        jets = _jets_after(functions, carried, made, lands, seen, x, mode)
+        parts = plan, carried, made, end, lands
+        jets, blur = _jets_after(functions, *parts, (seen, x, mode))
 
     # decide whether the remaining impacts can be completed by a formula
     rebound = jnp.maximum(
@@ -126,6 +131,7 @@ def land(
         x=x,
         mode=mode,
         jets=jets,
+        blur=blur,
         hit=hit,
         impact=impact,
         chatter=ending.chatter,
@@ -158,12 +164,24 @@ def _impact(functions: Functions, carried, made: Step, constraint, t, offset):
     return before, after
 
 
-def _jets_after(functions, carried, made, lands, t, x, mode):
-    """Return the jets at a state in a mode. Without an event or a contact, they are
-    those at the end of the step.
+def _jets_after(functions, plan, carried, made, end, lands, point):
+    """Return the jets and the rounding errors of the gaps at a time and a state in a
+    mode. Without an event or a contact, they are those at the end of the step.
+
+    With switching surfaces, the errors are not returned, because the mode may change
+    again.
     """
+
+    def blur(t, x, mode):
+        return () if functions.k else functions.blur(t, x, carried.extents, mode)
+
     changed = lands | any_of([*carried.closed, *(s > 0 for s in carried.stale)])
-    return functions.where(changed, lambda: functions.jets(t, x, mode), made.jets)
+    before = seen_from_inside(plan, end)(end.t), made.x, carried.mode
+    return functions.where(
+        changed,
+        lambda: (functions.jets(*point), blur(*point)),
+        (made.jets, blur(*before)),
+    )
 
 
 class _Ending(NamedTuple):
