@@ -249,12 +249,12 @@ class Functions:
         side = self._side(mode)
         return tuple(self._call("speed_blur", t, _pack(x), _pack(reach), *side))
 
-    def chatter(self, t, before, after, mode):
+    def chatter(self, t, states, speeds, mode):
         """Return C, r0 and the state P, defined in `surface/_chatter.py`, for each
-        constraint.
+        constraint, by the states and the normal velocities before and after an impact.
         """
-        side = self._side(mode)
-        parts = self._call("chatter", t, _pack(before), _pack(after), *side)
+        ends = map(_pack, (*states, *speeds))
+        parts = self._call("chatter", t, *ends, *self._side(mode))
         damping, restitution, rest = parts
         return tuple(damping), tuple(restitution), tuple(map(tuple, rest))
 

@@ -156,7 +156,9 @@ class Programs:
         self._add("frame", frame_of, time, state)
         self._add("lift", lift_of, time, state)
         self._add("speed_blur", speed_rounding, time, state, state)
-        self._add("chatter", completion_coefficients, time, state, state)
+        speeds = jax.ShapeDtypeStruct((self.m,), jnp.float64)
+        ends = state, state, speeds, speeds
+        self._add("chatter", completion_coefficients, time, *ends)
         if self.rubs:
             self._add("compliance", least_compliance, time, state)
         if self.joins:

@@ -70,7 +70,10 @@ def rest_of_chatter(
     gap and switching function.
     """
     t, before, after, approach, rebound, constraint, several, joins = impact
-    dampings, restitutions, states = functions.chatter(t, before, after, mode)
+    m = functions.m
+    ends = speeds[:m], [j.velocity for j in jets[:m]]
+    parts = functions.chatter(t, (before, after), ends, mode)
+    dampings, restitutions, states = parts
     damping = of_constraint(dampings, constraint)
     r0 = of_constraint(restitutions, constraint)
     state = states[0]

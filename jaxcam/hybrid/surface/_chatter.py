@@ -66,18 +66,17 @@ def completion_time(
     )
 
 
-def completion_coefficients(system, t, before, after):
-    """Return C and r0 of each constraint, for an impact from `before` to `after`.
+def completion_coefficients(system, t, before, after, approach, rebound):
+    """Return C and r0 of each constraint, for an impact from `before` to `after`, and
+    from the normal velocities `approach` to `rebound`, each `(m,)`.
 
     The third result is the state P without normal velocity, one row for each
     constraint, as if that constraint had been hit.
     """
-    velocity_before = normal_velocity(system, t, before)
-    velocity_after = normal_velocity(system, t, after)
-    jump = velocity_after - velocity_before
+    jump = rebound - approach
     safe = jnp.where(jump > 0, jump, jnp.ones_like(jump))
     inverse = 1 / safe
-    share = -velocity_before * inverse
+    share = -approach * inverse
     damping, restitution, rest = [], [], []
     for k in range(jump.shape[0]):
         direction = (after - before) * inverse[k]
