@@ -75,29 +75,26 @@ def land(
     offset = jnp.where(lands, flown.offset, 0.0)
     t = end.t + offset
     seen = seen_from_inside(plan, end)(t)
-    landed, after = functions.where(
-        lands,
-        lambda: _impact(functions, carried, made, flown.constraint, seen, offset),
-        (made.x, made.x),
-    )
-    number = functions.m + functions.k
-    hit = [lands & (flown.constraint == k) for k in range(number)]
-    strikes = any_of(hit[: functions.m]) if functions.k else lands
-    several, joins, after, hit = hits_together(
-        functions, carried, hit, made.jets, offset, seen, landed, after
-    )
+    number, no_hits = functions.m + functions.k, [no] * (functions.m + functions.k)
     speeds = [
         j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in made.jets
     ]
     approach = of_constraint(speeds, flown.constraint)
-    x = select(lands, after, made.x)
-    mode = _kept_contacts(functions, carried, lands, joins, seen, landed, x)
+
+    def reach() -> Reached:
+        return _reached(functions, carried, made, lands, flown, offset, seen)
+
+    reached = Reached(made.x, made.x, no, no, no_hits, made.x, carried.contact)
     slides, leaves, stuck = no, no, no
     if functions.k:
+        reached = functions.where(lands, reach, reached)
+        hit, x = reached.hit, reached.x
         sides = sides_after(functions, carried, made, hit, lands, seen, x)
-        mode = mode + sides.negative + sides.sliding
-        parts = plan, carried, made, end, lands
-        jets, _ = _jets_after(functions, *parts, (seen, x, mode))
+        mode = reached.mode + sides.negative + sides.sliding
+        changed = lands | any_of([*carried.closed, *(s > 0 for s in carried.stale)])
+        jets = functions.where(
+            changed, lambda: functions.jets(seen, x, mode), made.jets
+        )
         passed = past_surfaces(
             functions, carried, jets, hit, sides, approach, rounding, stops
         )
@@ -110,8 +107,17 @@ def land(
             x = select(passed.passed_over, moved, x)
         blur = functions.blur(seen, x, carried.extents, mode)
     else:
-        parts = plan, carried, made, end, lands
-        jets, blur = _jets_after(functions, *parts, (seen, x, mode))
+        # one branch contains the impact and the jets after it, because they share most
+        # of their operations
+        reached, jets, blur = functions.where(
+            lands | any_of(carried.closed),
+            lambda: _with_jets(functions, carried, seen, reach()),
+            _with_jets(
+                functions, carried, seen_from_inside(plan, end)(end.t), reached, made
+            ),
+        )
+        hit, x, mode = reached.hit, reached.x, reached.mode
+    strikes = any_of(hit[: functions.m]) if functions.k else lands
 
     # decide whether the remaining impacts can be completed by a formula
     rebound = jnp.maximum(
@@ -120,7 +126,14 @@ def land(
     higher = jnp.maximum(carried.fastest, rebound)
     fastest = jnp.where(strikes, higher, carried.fastest)
     impact = Impact(
-        t, landed, after, approach, rebound, flown.constraint, several, joins
+        t=t,
+        before=reached.before,
+        after=reached.after,
+        approach=approach,
+        rebound=rebound,
+        constraint=flown.constraint,
+        several=reached.several,
+        joins=reached.joins,
     )
     parts = carried, end, impact, speeds, jets, mode, hit, fastest, rounding
     ending = _ending(functions, plan, *parts)
@@ -148,6 +161,44 @@ def land(
     )
 
 
+class Reached(NamedTuple):
+    """The end of a step, after the impact or the crossing there, if there is one."""
+
+    # states before and after the impact; whether several constraints are hit, and
+    # whether the impact law for several applies; which constraints are hit
+    before: tuple
+    after: tuple
+    several: Any
+    joins: Any
+    hit: list
+    # the state to continue with, and which constraints are in contact
+    x: tuple
+    mode: tuple
+
+
+def _reached(functions: Functions, carried, made: Step, lands, flown, offset, t):
+    """Return the end of a step at the time `t`, which is `offset` after its end."""
+    before, after = _impact(functions, carried, made, flown.constraint, t, offset)
+    number = functions.m + functions.k
+    hit = [lands & (flown.constraint == k) for k in range(number)]
+    several, joins, after, hit = hits_together(
+        functions, carried, hit, made.jets, offset, t, before, after
+    )
+    x = select(lands, after, made.x)
+    mode = _kept_contacts(functions, carried, lands, joins, t, before, x)
+    return Reached(before, after, several, joins, hit, x, mode)
+
+
+def _with_jets(functions: Functions, carried, t, reached: Reached, made=None):
+    """Return the end of a step together with its jets and the rounding errors of the
+    gaps; the jets are those of the step `made`, if that is given.
+    """
+    at = t, reached.x, reached.mode
+    jets = functions.jets(*at) if made is None else made.jets
+    blur = functions.blur(t, reached.x, carried.extents, reached.mode)
+    return reached, jets, blur
+
+
 def _impact(functions: Functions, carried, made: Step, constraint, t, offset):
     """Return the states before and after the impact, or crossing, at the end of a
     step.
@@ -162,26 +213,6 @@ def _impact(functions: Functions, carried, made: Step, constraint, t, offset):
     for k in range(1, len(after_each)):
         after = select(constraint == k, after_each[k], after)
     return before, after
-
-
-def _jets_after(functions, plan, carried, made, end, lands, point):
-    """Return the jets and the rounding errors of the gaps at a time and a state in a
-    mode. Without an event or a contact, they are those at the end of the step.
-
-    With switching surfaces, the errors are not returned, because the mode may change
-    again.
-    """
-
-    def blur(t, x, mode):
-        return () if functions.k else functions.blur(t, x, carried.extents, mode)
-
-    changed = lands | any_of([*carried.closed, *(s > 0 for s in carried.stale)])
-    before = seen_from_inside(plan, end)(end.t), made.x, carried.mode
-    return functions.where(
-        changed,
-        lambda: (functions.jets(*point), blur(*point)),
-        (made.jets, blur(*before)),
-    )
 
 
 class _Ending(NamedTuple):
