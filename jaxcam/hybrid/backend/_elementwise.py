@@ -4,7 +4,6 @@ Each function takes the writer, the parameters of the operation, the JAX type of
 operands, and the operands, which are either all scalars or all vectors.
 """
 
-import math
 from typing import no_type_check
 
 import llvmlite.ir as ir

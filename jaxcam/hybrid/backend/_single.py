@@ -41,7 +41,9 @@ def log_of_single(writer: Writer, x):
     """Return the logarithm of a 32-bit float, given and returned as a 64-bit float."""
     a = Arithmetic(writer)
     bits = a.bits(x)
-    turns = a.b.ashr(a.b.sub(bits, writer.like(bits, _ROOT_HALF)), writer.like(bits, 52))
+    turns = a.b.ashr(
+        a.b.sub(bits, writer.like(bits, _ROOT_HALF)), writer.like(bits, 52)
+    )
     mantissa = a.b.sub(bits, a.b.shl(turns, writer.like(bits, 52)))
     f = a.sub(a.from_bits(mantissa), 1.0)
     k = a.b.sitofp(turns, x.type)
