@@ -132,8 +132,7 @@ class _Curve:
         self.scales = np.append(scale, float(window.end - window.begin))
 
     def values(self, rows) -> np.ndarray:
-        found = equations_at(self.problem, self.context.leaf, self.window, rows)
-        return np.asarray(found)
+        return equations_at(self.problem, self.context.leaf, self.window, rows)
 
     def around(self, row) -> tuple[np.ndarray, np.ndarray]:
         """Return the equations and their scaled Jacobian."""

@@ -10,13 +10,14 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, SwitchedSystem, SwitchedWrapping
 from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.surface import gaps, impacts, normal_velocity
 
-from .._parameter import with_leaf
+from .._parameter import as_jax, with_leaf
 
 
 class WithLiftedGaps(SwitchedWrapping):
@@ -51,40 +52,46 @@ class Window(eqx.Module):
     """Whether there is an impact at the unknown time."""
 
 
-@program
-def equations_at(problem: Any, leaf: int, window: Window, rows: Float[Array, "k u2"]):
+def equations_at(
+    problem: Any, leaf: int, window: Window, rows: Float[np.ndarray, "k u2"]
+) -> Float[np.ndarray, "k u2"]:
     """Return the equations of a period for several rows (unknowns, parameter, time).
 
     The time, as a fraction of the period, is that of the impact or of the smallest gap.
+    The motion is not traced, because its program would take long to compile.
 
     Returns:
         For each row, the residual of the problem, the gap and the normal velocity of
-        the constraint at that time, before the impact, `(k, u + 2)`.
+        the constraint at that time, before the impact, `(k, u + 2)`; NaN if the motion
+        ends early.
     """
-    return jax.vmap(lambda row: _equations(problem, leaf, window, row))(rows)
+    return np.stack([_equations(problem, leaf, window, row) for row in rows])
 
 
-def _equations(problem, leaf: int, window: Window, row):
-    system = with_leaf(problem.parameters, leaf, row[-2])
-    u, which = row[:-2], window.constraint
+def _equations(problem, leaf: int, window: Window, row) -> np.ndarray:
+    system = as_jax(with_leaf(problem.parameters, leaf, np.asarray(row[-2])))
+    u, which = jnp.asarray(row[:-2]), int(window.constraint)
     x = problem.state(u)
-    start, end = problem.times(u, system)
-    shares = jnp.stack([jnp.zeros(()), window.begin, row[-1], window.end, jnp.ones(())])
+    start, end = (float(time) for time in problem.times(u, system))
+    shares = np.array([0.0, window.begin, row[-1], window.end, 1.0])
     times = start + shares * (end - start)
-    number = gaps(system, start, x).shape[0]
-    lifts = jnp.where(jnp.arange(number) == which, window.lift, 0.0)
-    away = jnp.outer(jnp.array([0.0, 1.0, 1.0, 0.0]), lifts)
-    strikes = jnp.array([False, True, False, False]) & window.strikes
+    number = jax.eval_shape(lambda y: gaps(system, start, y), x).size
+    lifts = np.where(np.arange(number) == which, window.lift, 0.0)
+    met = np.zeros(2)
+    for piece, away in enumerate((0.0, 1.0, 1.0, 0.0)):
+        moved = WithLiftedGaps(system, jnp.asarray(away * lifts))
+        arrival = flow(moved, x, *times[piece : piece + 2], settings=problem.settings)
+        if int(arrival.code) != 0:
+            return np.full(row.size, np.nan)
+        x = arrival.state
+        if piece == 1:
+            gap, speed, after = _at_constraints(system, times[2], x)
+            met = np.array([gap[which], speed[which]])
+            x = after[which] if window.strikes else x
+    return np.concatenate([np.asarray(problem.closing(x, u, system)), met])
 
-    def piece(x, part):
-        t0, t1, lifts, strikes = part
-        moved = WithLiftedGaps(system, lifts)
-        arrival = flow(moved, x, t0, t1, settings=problem.settings)
-        y = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
-        met = gaps(system, t1, y)[which], normal_velocity(system, t1, y)[which]
-        return jnp.where(strikes, impacts(system, t1, y)[which], y), jnp.stack(met)
 
-    parts = times[:-1], times[1:], away, strikes
-    arrived, met = jax.lax.scan(piece, x, parts)
-    off = problem.closing(arrived, u, system)
-    return jnp.concatenate([off, met[1]])
+@program
+def _at_constraints(system, t, x):
+    """Return the gaps, the normal velocities, and the states after impacts."""
+    return gaps(system, t, x), normal_velocity(system, t, x), impacts(system, t, x)

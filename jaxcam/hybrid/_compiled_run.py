@@ -55,14 +55,28 @@ def _row(record, lane: LoopState):
     return lane.steps - 1.0, numbers_of_row(record)
 
 
+class CompiledRun(NamedTuple):
+    """A run by LLVM: the log of its accepted steps, the mode at its start, and the loop
+    state at its end, all as numpy arrays and numbers.
+    """
+
+    log: Log
+    mode: np.ndarray
+    end: LoopState
+
+
 def run_compiled(
-    case: tuple, budget: int, chunk: int, progress: Callable[[float], None]
-) -> tuple[Log, np.ndarray, Any]:
-    """Return the log of the accepted steps, the initial mode, and the status.
+    case: tuple,
+    budget: int,
+    progress: Callable[[float], None] | None = None,
+    chunk: int = 2048,
+) -> CompiledRun:
+    """Return a run that is not traced.
 
     **Arguments:** the prepared system, the settings, t0, the state and t1; the maximum
-    number of attempted steps; the number of attempts in a chunk; and a function that is
-    called with the time (s) after each chunk.
+    number of attempted steps; a function that is called with the time (s) after each
+    chunk; and the number of attempted steps in a chunk. Between chunks, a run can be
+    interrupted.
 
     **Raises:** `Lacking` with the name of an operation that the backend does not have.
     """
@@ -92,6 +106,8 @@ def run_compiled(
         used += size
         if lane[0, place.status] != RUNNING or used >= budget:
             break
-        progress(lane[0, place.t])
+        if progress is not None:
+            progress(lane[0, place.t])
     log = log_of(np.concatenate(tables), len(place.x))
-    return log, mode, lane[0, place.status]
+    end = jax.tree.map(lambda k: lane[0, k], place)
+    return CompiledRun(log, mode, end)

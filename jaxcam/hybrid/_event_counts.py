@@ -1,7 +1,9 @@
 """Count the events of a motion, for runs that do not list each event."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from .codes import RowKind
@@ -28,6 +30,26 @@ class EventCounts(eqx.Module):
     def zero() -> "EventCounts":
         """Return the numbers at the start of a motion, all zero."""
         return EventCounts(*(jnp.zeros(()) for _ in range(5)))
+
+    @staticmethod
+    def of(kinds: Float[np.ndarray, " rows"]) -> "EventCounts":
+        """Return the numbers in a motion, from the `RowKind` of each attempted step."""
+        quiet = (kinds <= float(RowKind.STEP)) | (kinds == float(RowKind.STOP))
+        events = kinds[~quiet]
+        hits = events == float(RowKind.IMPACT)
+        place = np.arange(1, len(events) + 1)
+        others = np.maximum.accumulate(np.where(hits, 0, place))
+        # of each event, the number of impacts that directly precede it
+        recent = np.concatenate([[0], place - others])
+        completes = events == float(RowKind.LAST_IMPACT)
+        numbers = (
+            np.sum(hits) - np.sum(recent[:-1][completes]),
+            np.sum(completes),
+            np.sum(events == float(RowKind.SWITCH)),
+            np.sum(events == float(RowKind.SLIDE)),
+            recent[-1],
+        )
+        return EventCounts(*jax.device_put([np.float64(n) for n in numbers]))
 
     def after(self, kind: Float[Array, ""]) -> "EventCounts":
         """Return the numbers after an attempted step of the given `RowKind`."""

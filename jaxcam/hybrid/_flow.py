@@ -6,18 +6,22 @@ import equinox as eqx
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..parameters import as_arrays, real_array, VectorLike
+from ._compiled_run import run_compiled
 from ._event_counts import EventCounts
+from ._prepared import prepared
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
+from .backend import Lacking, say_lacking
 from .checks import check_system
 from .codes import RUNNING
 from .loop import first_state, Functions, iteration, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
-from .programs import is_traced, is_tracing
+from .programs import is_outermost, is_traced, is_tracing
 
 
 # number of iterations between two checks of whether a batch element is still running
@@ -58,6 +62,8 @@ def flow(
     The function is pure: it can be compiled (`jit`), batched (`vmap`) and
     differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
     parameters. A gradient costs one forward derivative per differentiation variable.
+    Outside of transformations, the loop is compiled by LLVM, like that of
+    [`jaxcam.simulate`][].
     The numbers of impacts, contacts and releases may differ between batch elements. If
     the start is invalid (a negative gap, a state that is not finite, or t1 < t0),
     `code` gives the reason and the final state is NaN. Outside of transformations, the
@@ -93,8 +99,28 @@ def flow(
         if not is_traced((system, state, t0)):
             check_system(system, jnp.asarray(t0, jnp.float64), state, settings)
     t0, t1 = jnp.asarray(t0, jnp.float64), jnp.asarray(t1, jnp.float64)
+    if settings.compiles and is_outermost():
+        try:
+            return _by_llvm(system, settings, state, t0, t1, max_steps)
+        except Lacking as lacking:
+            say_lacking(lacking, settings.demands)
     run = _flow if settings.plain else whole(_flow)
     return run(system, settings, state, t0, t1, max_steps)
+
+
+def _by_llvm(system, settings, state, t0, t1, max_steps: int) -> Arrival:
+    log, mode, end = run_compiled(
+        (prepared(system), settings, t0, state, t1), max_steps
+    )
+    return Arrival(
+        state=jnp.asarray(end.x),
+        contact=jnp.asarray(end.contact, dtype=bool),
+        impacts=jnp.asarray(end.impacts),
+        steps=jnp.asarray(end.steps),
+        code=jnp.asarray(int(end.status), dtype=jnp.int32),
+        events=EventCounts.of(np.asarray(log.kind)),
+        start=jnp.asarray(mode),
+    )
 
 
 def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:

@@ -50,11 +50,9 @@ def _said(progress, t, t0, t1) -> None:
 
 def _by_llvm(system, settings, t0, state, t1, budget, progress):
     case = prepared(system), settings, t0, state, t1
-    log, mode, status = run_compiled(
-        case, budget, _CHUNK, lambda t: _said(progress, t, t0, t1)
-    )
+    made = run_compiled(case, budget, lambda t: _said(progress, t, t0, t1), _CHUNK)
     _said(progress, t1, t0, t1)
-    return log, mode, jnp.asarray(status, jnp.int32)
+    return made.log, made.mode, jnp.asarray(made.end.status, jnp.int32)
 
 
 @eqx.filter_jit
