@@ -19,7 +19,7 @@ from ._types import RealScalar
 from .backend import Lacking, say_lacking
 from .checks import check_system
 from .codes import RUNNING
-from .loop import first_state, Functions, iteration, Plan
+from .loop import first_state, Functions, iteration, LoopState, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
 from .programs import is_outermost, is_traced, is_tracing
 
@@ -109,16 +109,24 @@ def flow(
 
 
 def _by_llvm(system, settings, state, t0, t1, max_steps: int) -> Arrival:
-    log, mode, end = run_compiled(
-        (prepared(system), settings, t0, state, t1), max_steps
-    )
+    case = prepared(system), settings, t0, state, t1
+    made = run_compiled(case, max_steps)
+    return arrival_of(made.end, np.asarray(made.log.kind), made.mode)
+
+
+def arrival_of(end: LoopState, kinds, mode) -> Arrival:
+    """Return the `Arrival` of a run that is not traced.
+
+    **Arguments:** the loop state at its end, the kinds of its attempted steps, and the
+    mode at its start.
+    """
     return Arrival(
         state=jnp.asarray(end.x),
         contact=jnp.asarray(end.contact, dtype=bool),
         impacts=jnp.asarray(end.impacts),
         steps=jnp.asarray(end.steps),
         code=jnp.asarray(int(end.status), dtype=jnp.int32),
-        events=EventCounts.of(np.asarray(log.kind)),
+        events=EventCounts.of(kinds),
         start=jnp.asarray(mode),
     )
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from .._system import HybridSystem
 from ..backend import Rowwise
+from ..dependence import dependent
 from ..loop import attempts, first_state, Functions, LoopState, Plan, run_many
 from ..lowering import one_kernel, Packed, without_library
 
@@ -258,11 +259,7 @@ def _depends(function: Callable, argument):
     """Return whether each leaf of the result depends on the argument."""
     result = eqx.filter_eval_shape(function, argument)
     closed = jax.make_jaxpr(lambda a: eqx.filter(function(a), eqx.is_array))(argument)
-    known = {id(v) for v in closed.jaxpr.invars}
-    for equation in closed.jaxpr.eqns:
-        if any(id(v) in known for v in equation.invars):
-            known |= {id(v) for v in equation.outvars}
-    found = iter([id(v) in known for v in closed.jaxpr.outvars])
+    found = iter(dependent(closed))
 
     def said(leaf):
         return next(found) if isinstance(leaf, jax.ShapeDtypeStruct) else False

@@ -48,6 +48,7 @@ class Functions:
         parameters, static = eqx.partition(system, eqx.is_inexact_array)
         found = programs_of(static, parameters, n, plain=plain, shared=shared)
         self._program = found.by_name
+        self.system = system
         self.n, self.m, self.k = n, found.m, found.k
         self.plain, self.planar = plain, found.planar
         self._branches = branches
