@@ -29,6 +29,17 @@ class AbstractAtOnce(AbstractProblem):
     `derivatives` and `seen` would each contain a copy.
     """
 
+    def evaluated_on_host(self, leaf: int, z) -> Evaluation | None:
+        """Return all quantities, computed outside of traced programs, as NumPy arrays;
+        None if the problem can only be traced.
+
+        Args:
+            leaf: Index of the varying parameter.
+            z: Unknowns and parameter, shape `(n + 1,)`.
+        """
+        del leaf, z
+        return None
+
     @abc.abstractmethod
     def evaluated(self, u, p, parameters_at: Callable) -> Evaluation:
         """Return all quantities at a point.

@@ -12,7 +12,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
-from jaxcam.hybrid.newton import newton_at_once
+from jaxcam.hybrid.newton import newton_at_once, newton_on_host
 from jaxcam.hybrid.programs import program
 
 from ._context import Context
@@ -148,19 +148,26 @@ def _at_once(
         return problem.evaluated(z[:-1], z[-1], at)
 
     def equations(y, found):
-        value = found.residual / scale[:-1]
-        matrix = found.jacobian * scale[None, :] / scale[:-1, None]
-        if least_norm:
-            return value, matrix
-        plane = jnp.dot(normal * scale, y - guess / scale)
-        row = (normal * scale)[None]
-        return jnp.append(value, plane), jnp.concatenate([matrix, row])
+        return _augmented(y, guess, scale, normal, found, least_norm)
 
     start = guess / scale
     solved = newton_at_once(evaluate, equations, start, tolerance, iterations, given)
     z = jnp.where(given, guess, solved.y * scale)
     success, found = solved.success | given, solved.found
     return _corrected(problem, leaf, z, old, width, success, solved.iterations, found)
+
+
+def _augmented(y, guess, scale, normal, found: Evaluation, least_norm: bool, xp=jnp):
+    """Return the scaled equations and their Jacobian; unless `least_norm`, the last
+    equation is that of the plane through the guess.
+    """
+    value = found.residual / scale[:-1]
+    matrix = found.jacobian * scale[None, :] / scale[:-1, None]
+    if least_norm:
+        return value, matrix
+    plane = xp.dot(normal * scale, y - guess / scale)
+    row = (normal * scale)[None]
+    return xp.append(value, plane), xp.concatenate([matrix, row])
 
 
 def _seen(problem, leaf, z, old, width, success, iterations) -> Corrected:
@@ -216,6 +223,10 @@ def correct(
     """
     padded = problem.padded()
     vectors = [np.asarray(z) for z in (guess, normal, old)]
+    if isinstance(problem, AbstractAtOnce) and padded is None:
+        at = _on_host(problem, context, *vectors, least_norm, given)
+        if at is not None:
+            return at
     if padded is not None:
         vectors = [padded.widened(z) for z in vectors]
     at = _plain(
@@ -231,6 +242,43 @@ def correct(
         )
     )
     return at if padded is None else _narrowed(at, padded, problem)
+
+
+_scales, _complete = program(scale_at), program(_corrected)
+
+
+def _on_host(
+    problem: AbstractAtOnce, context: Context, guess, normal, old, least_norm, given
+) -> Corrected | None:
+    """Return the result of `correct` for a problem that is evaluated outside of traced
+    programs; None if it cannot be.
+    """
+    leaf, settings = context.leaf, context.settings
+    first = problem.evaluated_on_host(leaf, guess)
+    if first is None:
+        return None
+    width = np.asarray(context.width)
+    scale = np.asarray(_scales(problem, leaf, guess, width))
+
+    start = guess / scale
+
+    def evaluate(y):
+        return first if y is start else problem.evaluated_on_host(leaf, y * scale)
+
+    def equations(y, found):
+        return _augmented(y, guess, scale, normal, found, least_norm, np)
+
+    solved = newton_on_host(
+        evaluate,
+        equations,
+        start,
+        settings.tolerance,
+        settings.max_iterations,
+        bool(given),
+    )
+    z = guess if given else solved.y * scale
+    success, count = np.asarray(solved.success or given), np.asarray(solved.iterations)
+    return _plain(_complete(problem, leaf, z, old, width, success, count, solved.found))
 
 
 def _narrowed(at: Corrected, padded: Padded, problem: AbstractProblem) -> Corrected:

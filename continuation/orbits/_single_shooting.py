@@ -13,6 +13,7 @@ from jaxcam.hybrid import flow, HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import AnyArray
 from variational import Orbit
+from variational.orbits import direction_of
 
 from .._evaluation import AbstractAtOnce, Evaluation
 from .._other_unknowns import AbstractRestated
@@ -22,6 +23,7 @@ from .._touch import Touch
 from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ..representation import Unique
 from ..special import FLIP, flip_direction
+from ._by_llvm import evaluated_by_llvm
 from ._event_changes import (
     events_of,
     monitors_of_events,
@@ -29,10 +31,10 @@ from ._event_changes import (
     values_of_events,
 )
 from ._gap_grazing import touching
-from ._phase_condition import direction_of
 from ._run_twice import shooting_twice
 from ._shooting_signature import family_of, numbers_in
 from ._start_of_period import moved_start, sampled
+from ._states_at_periods import states_at_periods
 
 
 class SingleShooting(AbstractAtOnce, AbstractRestated):
@@ -215,19 +217,26 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         """
         times = self.times(u, parameters)
         arrival = flow(parameters, self.state(u), *times, settings=self.settings)
-        found = self._observed(arrival, u, parameters)
+        found = self._all_observed(arrival, u, parameters)
         return values_of_events(arrival), found
 
-    def _observed(self, arrival, u, parameters):
+    def observed(self, arrival, u, parameters):
+        """Return the observed quantities, except for the states at integer multiples of
+        the forcing period.
+        """
         x, (start, end) = self.state(u), self.times(u, parameters)
-        found = {
+        return {
             "period": end - start,
             "time": start,
             "state": x,
             "impacts": arrival.impacts,
         }
+
+    def _all_observed(self, arrival, u, parameters):
+        found = self.observed(arrival, u, parameters)
         if self.periods:
-            found["stroboscopic"] = self._stroboscopic(x, start, end, parameters)
+            x, times = self.state(u), self.times(u, parameters)
+            found["stroboscopic"] = states_at_periods(self, x, *times, parameters)
         return found
 
     def evaluated(self, u, p, parameters_at) -> Evaluation:
@@ -255,7 +264,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
             whole,
             self.linearisation(u, parameters, whole[:, :-1]),
             values_of_events(arrival),
-            self._observed(arrival, u, parameters),
+            self._all_observed(arrival, u, parameters),
         )
 
     def monitors(self) -> dict[str, Monitor]:
@@ -272,16 +281,8 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
 
         return name_of_change(events(*before), events(*after))
 
-    def _stroboscopic(self, x, start, end, parameters):
-        if self.periods == 1:
-            return x[None]
-        parts = jnp.arange(1, self.periods, dtype=jnp.float64) / self.periods
-
-        def later(part):
-            until = start + part * (end - start)
-            return flow(parameters, x, start, until, settings=self.settings).state
-
-        return jnp.concatenate([x[None], jax.vmap(later)(parts)])
+    def evaluated_on_host(self, leaf: int, z) -> Evaluation | None:
+        return evaluated_by_llvm(self, leaf, z)
 
     # -- between compiled programs
 
@@ -329,8 +330,8 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     def refreshed(self, u, parameters) -> "SingleShooting":
         if self.periods:
             return self
-        u = jnp.asarray(u)
-        normal = direction_of(self, u, parameters)
+        u, system = jnp.asarray(u), as_jax(parameters)
+        normal = direction_of(system, u[:-1], jnp.zeros(()), u[-1], self.settings)
         # keep the sign of the normal, so that the test functions are continuous
         normal = jnp.where(normal @ self.normal < 0, -normal, normal)
         return dataclasses.replace(self, reference=u[:-1], normal=normal)

@@ -1,7 +1,7 @@
 """Run one trajectory in a loop compiled by LLVM."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax

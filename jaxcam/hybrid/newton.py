@@ -1,9 +1,10 @@
-"""Apply Newton's method with a program that is evaluated at only one place.
+"""Apply Newton's method with one evaluation of all quantities per iterate.
 
 Each place at which a program evaluates the motion over a period is compiled separately,
 and this takes much longer than running it. Here, the values, the derivatives and all
 other quantities of an iterate come from one evaluation in the loop; those of the
-solution are the results of the last one.
+solution are the results of the last one. The loop is part of a traced program, or is
+run by Python.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 
 class Solved(NamedTuple):
@@ -70,8 +72,32 @@ def newton_at_once(
     return Solved(y, success & jnp.all(jnp.isfinite(y)), count, found)
 
 
-def _correction(matrix, value):
+def newton_on_host(
+    evaluate: Callable, equations: Callable, y, tolerance, iterations: int, given: bool
+) -> Solved:
+    """Return the same as `newton_at_once`, for functions that are called from Python
+    and return NumPy arrays.
+    """
+    y, success, count = np.asarray(y), False, 0
+    tolerance = float(tolerance)
+    found = evaluate(y)
+    while not given and count < iterations:
+        value, matrix = equations(y, found)
+        try:
+            step = _correction(matrix, value, np)
+        except np.linalg.LinAlgError:
+            step = np.full_like(y, np.nan)
+        y, count = y - step, count + 1
+        found = evaluate(y)
+        small = np.max(np.abs(step) / (tolerance * (1.0 + np.abs(y)))) < 1
+        success = bool(small and np.max(np.abs(value)) < tolerance)
+        if success or not np.all(np.isfinite(step)):
+            break
+    return Solved(y, success and bool(np.all(np.isfinite(y))), count, found)
+
+
+def _correction(matrix, value, xp=jnp):
     rows, columns = matrix.shape
     if rows == columns:
-        return jnp.linalg.solve(matrix, value)
-    return matrix.T @ jnp.linalg.solve(matrix @ matrix.T, value)
+        return xp.linalg.solve(matrix, value)
+    return matrix.T @ xp.linalg.solve(matrix @ matrix.T, value)

@@ -7,6 +7,7 @@
 from ._admissible import inadmissible as inadmissible, refuse as refuse
 from ._at_grazing import multipliers_at_grazing as multipliers_at_grazing
 from ._builder import builder as builder, picked as picked
+from ._direction import direction_of as direction_of
 from ._flight import flight_end as flight_end, flight_nodes as flight_nodes
 from ._gap_sizes import gap_sizes as gap_sizes
 from ._impact_orbit import (

@@ -1,24 +1,26 @@
 """The map over one period by the event loop: its derivatives, and its fixed points.
 
-One program serves both purposes, because it takes long to compile.
+The loop and its derivatives are compiled by LLVM if possible; otherwise one program of
+XLA serves both purposes, because it takes long to compile.
 """
 
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxcam.hybrid import flow, Settings, simulate
-from jaxcam.hybrid.newton import newton_at_once
+from jaxcam.hybrid import flow, Settings
+from jaxcam.hybrid.flow_jacobian import flow_jacobian, runs_by_llvm
+from jaxcam.hybrid.newton import newton_at_once, newton_on_host
 from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
 from jaxcam.parameters import as_arrays
 
 from ._builder import builder
+from ._direction import direction_of
 
 
-_SHORT = 1e-6
-"""Fraction of a period over which the direction of the motion is computed."""
 _TOLERANCE, _ITERATIONS = 1e-9, 30
 """Accuracy of a fixed point, relative to the sizes of the unknowns, and the largest
 number of corrections.
@@ -38,14 +40,20 @@ def fixed_by_flow(
     normal = jnp.zeros(len(guess))
     start, period = (jnp.asarray(float(time), jnp.float64) for time in (t0, length))
     if free:
-        short = float(t0) + _SHORT * length
-        later = simulate(system, guess, t0, short, settings=settings)
-        sizes = _sizes(system, start, guess, period)
-        normal = (jnp.asarray(later.final) - guess) / sizes
+        normal = direction_of(system, jnp.asarray(guess), start, period, settings)
     given = jnp.zeros(0), None, guess, start, period, as_arrays(settings), normal
-    state, period, success, _ = _over_period(
-        system, *given, jnp.asarray(free), jnp.array(False)
+    sizes = _sizes(system, start, guess, period)
+    found = runs_by_llvm(
+        settings,
+        (system, guess, t0),
+        lambda: _fixed_by_llvm(system, *given[2:6], normal, sizes, free),
     )
+    if found is None:
+        state, period, success, _ = _over_period(
+            system, *given, jnp.asarray(free), jnp.array(False)
+        )
+    else:
+        state, period, success = found
     return (state, float(period)) if bool(success) else None
 
 
@@ -57,8 +65,52 @@ def derivatives_by_flow(system, values, where, state, t0, length, settings: Sett
     start, period = (jnp.asarray(time, jnp.float64) for time in (t0, length))
     normal = jnp.zeros(len(state))
     given = values, where, state, start, period, as_arrays(settings), normal
+    made = runs_by_llvm(
+        settings,
+        (system, values, state, start, period),
+        lambda: _by_llvm(system, *given[:6]),
+    )
+    if made is not None:
+        return made[1]
     *_, derivatives = _over_period(system, *given, no, ~no)
     return derivatives
+
+
+def _turn(given, y):
+    """Return the system and the motion over a period that belong to the variables."""
+    system, where, n = given
+    x, start, length, values = y[:n], y[n], y[n + 1], y[n + 2 :]
+    return builder(system, where)(values), x, start, start + length
+
+
+def _by_llvm(system, values, where, state, t0, length, settings):
+    """Return the state after a period, and its derivatives."""
+    n = len(state)
+    y = np.concatenate([np.asarray(part).ravel() for part in (state, t0, length)])
+    y = np.append(y, np.asarray(values))
+    arrival, whole = flow_jacobian(_turn, (system, where, n), y, settings)
+    parts = whole[:, :n], whole[:, n], whole[:, n + 1], whole[:, n + 2 :]
+    return arrival.state, parts
+
+
+def _fixed_by_llvm(system, guess, t0, length, settings, normal, sizes, free: bool):
+    """Return the fixed point, the period, and whether there is one."""
+    n, guess, normal = len(guess), np.asarray(guess), np.asarray(normal)
+    sizes, period = np.asarray(sizes), float(length)
+
+    def evaluate(y):
+        at = y[:n] * sizes, t0, y[n] * period
+        made = _by_llvm(system, np.zeros(0), None, *at, settings)
+        return jax.tree.map(np.asarray, made)
+
+    def equations(y, found):
+        return _closing(y[:n] * sizes, guess, period, found, normal, sizes, free, np)
+
+    start = np.append(guess / sizes, 1.0)
+    found = newton_on_host(evaluate, equations, start, _TOLERANCE, _ITERATIONS, False)
+    duration = found.y[n] * period
+    success = found.success and duration > 0
+    return jnp.asarray(found.y[:n] * sizes), duration, success
 
 
 def _sizes(system, t0, state, length):
@@ -95,17 +147,26 @@ def _over_period(
         return derivative(x, t0, duration, values)
 
     def equations(y, found):
-        (by_state, _, by_length, _), after = found
+        derivatives, after = found
         x, _ = unknowns(y)
-        matrix = by_state * sizes[None] / sizes[:, None] - jnp.eye(n)
-        matrix = jnp.column_stack([matrix, by_length * length / sizes])
-        off_plane = jnp.dot(normal, (x - guess) / sizes) / _SHORT
-        across = jnp.append(normal / _SHORT, 0.0)
-        fixed = jnp.zeros(n + 1).at[n].set(1.0)
-        value = jnp.append((after - x) / sizes, jnp.where(free, off_plane, 0.0))
-        return value, jnp.vstack([matrix, jnp.where(free, across, fixed)])
+        found = after, derivatives
+        return _closing(x, guess, length, found, normal, sizes, free)
 
     start = jnp.append(guess / sizes, 1.0)
     found = newton_at_once(evaluate, equations, start, _TOLERANCE, _ITERATIONS, given)
     x, duration = unknowns(found.y)
     return x, duration, found.success & (duration > 0), found.found[0]
+
+
+def _closing(x, guess, length, found, normal, sizes, free, xp=jnp):
+    """Return the equations of a fixed point, relative to the sizes of the components,
+    and their Jacobian. The last equation fixes the phase or, with forcing, the period.
+    """
+    after, (by_state, _, by_length, _) = found
+    n = x.shape[0]
+    matrix = by_state * sizes[None] / sizes[:, None] - xp.eye(n)
+    matrix = xp.column_stack([matrix, by_length * length / sizes])
+    off_plane = xp.dot(normal, (x - guess) / sizes)
+    across, fixed = xp.append(normal, 0.0), xp.append(xp.zeros(n), 1.0)
+    value = xp.append((after - x) / sizes, xp.where(free, off_plane, 0.0))
+    return value, xp.vstack([matrix, xp.where(free, across, fixed)])

@@ -6,7 +6,7 @@ the time to compile that XLA needs for the same derivatives.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -18,10 +18,22 @@ from ..parameters import as_arrays
 from ._flow import Arrival, arrival_of
 from ._settings import Settings
 from ._started import started
-from .backend import Attempts, attempts_of, key_of, Lacking, laid_out, Rowwise
+from .backend import (
+    Attempts,
+    attempts_of,
+    key_of,
+    Lacking,
+    laid_out,
+    Rowwise,
+    say_lacking,
+)
 from .caches import Cache
 from .dependence import dependent
 from .loop import Functions, iteration, LoopState, Plan
+from .programs import is_outermost, is_traced
+
+
+T = TypeVar("T")
 
 
 class Moving(NamedTuple):
@@ -156,7 +168,9 @@ def _start(case, _=None) -> _Started:
         *(jax.tree.map(lambda a, k=k: a[k], tangents) for k in range(y.shape[0])),
         strict=True,
     )
-    return _Started(*both, JacobianState(carried, moving, numbers, rates), shapes)
+    system, plan = both
+    first = JacobianState(carried, moving, numbers, rates)
+    return _Started(system, plan, first, shapes)
 
 
 _STARTED = Rowwise(_start, width=1)
@@ -188,8 +202,27 @@ def _row(record, lane: JacobianState):
     return lane.steps - 1.0, [record.kind]
 
 
+def runs_by_llvm(settings: Settings, values: Any, run: Callable[[], T]) -> T | None:
+    """Return the result of `run`, which needs the LLVM backend; None if the settings or
+    a transformation exclude it, or if it lacks an operation.
+
+    **Arguments:** `values` are the numbers on which `run` depends.
+
+    **Raises:** `ValueError` if the settings demand LLVM and it lacks an operation.
+    """
+    if not settings.compiles or not is_outermost() or is_traced(values):
+        return None
+    try:
+        return run()
+    except Lacking as lacking:
+        say_lacking(lacking, settings.demands)
+        return None
+
+
 def _begun(case) -> tuple[_Loop, np.ndarray, np.ndarray]:
-    """Return the loop, the numbers of system and plan, and the first state, `(1, k)`."""
+    """Return the loop, the numbers of system and plan, and the first state,
+    `(1, k)`.
+    """
 
     def first_of(tree) -> _Started:
         return jax.tree.map(lambda a: a[0] if isinstance(a, np.ndarray) else a, tree)
