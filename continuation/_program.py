@@ -224,7 +224,8 @@ def correct(
     padded = problem.padded()
     vectors = [np.asarray(z) for z in (guess, normal, old)]
     if isinstance(problem, AbstractAtOnce) and padded is None:
-        at = _on_host(problem, context, *vectors, least_norm, given)
+        direction = {"normal": vectors[1], "old": vectors[2]}
+        at = _on_host(problem, context, vectors[0], least_norm, given, **direction)
         if at is not None:
             return at
     if padded is not None:
@@ -248,7 +249,7 @@ _scales, _complete = program(scale_at), program(_corrected)
 
 
 def _on_host(
-    problem: AbstractAtOnce, context: Context, guess, normal, old, least_norm, given
+    problem: AbstractAtOnce, context: Context, guess, least_norm, given, *, normal, old
 ) -> Corrected | None:
     """Return the result of `correct` for a problem that is evaluated outside of traced
     programs; None if it cannot be.

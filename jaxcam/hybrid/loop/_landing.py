@@ -75,7 +75,7 @@ def land(
     offset = jnp.where(lands, flown.offset, 0.0)
     t = end.t + offset
     seen = seen_from_inside(plan, end)(t)
-    number, no_hits = functions.m + functions.k, [no] * (functions.m + functions.k)
+    no_hits = [no] * (functions.m + functions.k)
     speeds = [
         j.velocity + offset * (j.acceleration + offset * j.jerk / 2) for j in made.jets
     ]
@@ -85,27 +85,10 @@ def land(
         return _reached(functions, carried, made, lands, flown, offset, seen)
 
     reached = Reached(made.x, made.x, no, no, no_hits, made.x, carried.contact)
-    slides, leaves, stuck = no, no, no
     if functions.k:
         reached = functions.where(lands, reach, reached)
-        hit, x = reached.hit, reached.x
-        sides = sides_after(functions, carried, made, hit, lands, seen, x)
-        mode = reached.mode + sides.negative + sides.sliding
-        changed = lands | any_of([*carried.closed, *(s > 0 for s in carried.stale)])
-        jets = functions.where(
-            changed, lambda: functions.jets(seen, x, mode), made.jets
-        )
-        passed = past_surfaces(
-            functions, carried, jets, hit, sides, approach, rounding, stops
-        )
-        jets, stuck = passed.jets, passed.stuck
-        slides, leaves = any_of(passed.slides), any_of(sides.leaves)
-        flags = zip(mode[number:], passed.slides, strict=True)
-        mode = mode[:number] + tuple(a | b for a, b in flags)
-        if functions.m and functions.slidable:
-            moved, _ = functions.settled(seen, x, mode)
-            x = select(passed.passed_over, moved, x)
-        blur = functions.blur(seen, x, carried.extents, mode)
+        parts = seen, lands, reached, approach, rounding, stops
+        after = _after_surfaces(functions, carried, made, *parts)
     else:
         # one branch contains the impact and the jets after it, because they share most
         # of their operations
@@ -116,7 +99,8 @@ def land(
                 functions, carried, seen_from_inside(plan, end)(end.t), reached, made
             ),
         )
-        hit, x, mode = reached.hit, reached.x, reached.mode
+        after = After(reached.x, reached.mode, jets, blur, no, no, no)
+    x, mode, jets, hit = after.x, after.mode, after.jets, reached.hit
     strikes = any_of(hit[: functions.m]) if functions.k else lands
 
     # decide whether the remaining impacts can be completed by a formula
@@ -144,7 +128,7 @@ def land(
         x=x,
         mode=mode,
         jets=jets,
-        blur=blur,
+        blur=after.blur,
         hit=hit,
         impact=impact,
         chatter=ending.chatter,
@@ -155,9 +139,9 @@ def land(
         hidden=hidden,
         loses=strikes & loses_energy(impact),
         strikes=strikes,
-        slides=slides,
-        leaves=leaves,
-        stuck=stuck,
+        slides=after.slides,
+        leaves=after.leaves,
+        stuck=after.stuck,
     )
 
 
@@ -187,6 +171,48 @@ def _reached(functions: Functions, carried, made: Step, lands, flown, offset, t)
     x = select(lands, after, made.x)
     mode = _kept_contacts(functions, carried, lands, joins, t, before, x)
     return Reached(before, after, several, joins, hit, x, mode)
+
+
+class After(NamedTuple):
+    """What the motion continues with; see `Landing`."""
+
+    x: tuple
+    mode: tuple
+    jets: list
+    blur: tuple
+    slides: Any
+    leaves: Any
+    stuck: Any
+
+
+def _after_surfaces(
+    functions: Functions,
+    carried: LoopState,
+    made: Step,
+    t,
+    lands,
+    reached: Reached,
+    approach,
+    rounding,
+    stops,
+) -> After:
+    """Return what the motion continues with if there are switching surfaces."""
+    number, hit, x = functions.m + functions.k, reached.hit, reached.x
+    sides = sides_after(functions, carried, made, hit, lands, t, x)
+    mode = reached.mode + sides.negative + sides.sliding
+    changed = lands | any_of([*carried.closed, *(s > 0 for s in carried.stale)])
+    jets = functions.where(changed, lambda: functions.jets(t, x, mode), made.jets)
+    passed = past_surfaces(
+        functions, carried, jets, hit, sides, approach, rounding, stops
+    )
+    flags = zip(mode[number:], passed.slides, strict=True)
+    mode = mode[:number] + tuple(a | b for a, b in flags)
+    if functions.m and functions.slidable:
+        moved, _ = functions.settled(t, x, mode)
+        x = select(passed.passed_over, moved, x)
+    blur = functions.blur(t, x, carried.extents, mode)
+    flags = any_of(passed.slides), any_of(sides.leaves), passed.stuck
+    return After(x, mode, passed.jets, blur, *flags)
 
 
 def _with_jets(functions: Functions, carried, t, reached: Reached, made=None):
