@@ -19,7 +19,6 @@ from ...recordings.cut import (
 )
 from ..engine import Layout, Model, Parameter, parameter_places
 from ._impacts import Search
-from ._meeting import Meeting
 from ._record import record_of
 from ._windows import Flyer
 
@@ -78,13 +77,14 @@ def located(
     return given
 
 
-def _given(recording: Recording, search: Search, met: list[Meeting]) -> GivenImpacts:
+def _given(
+    recording: Recording, search: Search, met: list[GivenImpact]
+) -> GivenImpacts:
     begin, interval = float(recording.time[0]), recording.interval
     found = [
-        GivenImpact(
-            begin + one.place * interval,
-            max(one.place_stderr, _LEAST_STDERR) * interval,
-            *one[2:],
+        one._replace(
+            time=begin + one.time,
+            time_stderr=max(one.time_stderr, _LEAST_STDERR * interval),
         )
         for one in met
     ]

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ...recordings.cut import GivenImpact
 from ..engine import Parameter
 from ._candidates import candidates, near_a_surface
-from ._meeting import Meeting, meeting
+from ._meeting import meeting
 from ._windows import Flyer, Window
 
 
@@ -50,7 +51,7 @@ class _Mark:
     place: float
     margin: float = _UNCLEAR
     gain: float = math.inf
-    met: Meeting | None = None
+    met: GivenImpact | None = None
     contact: bool = False
 
     @classmethod
@@ -101,7 +102,7 @@ class Search:
         self.marks = [_Mark(float(k)) for k in found]
         self.refused: set[int] = set()
 
-    def run(self) -> list[Meeting]:
+    def run(self) -> list[GivenImpact]:
         """Return the impacts, in order."""
         for _ in range(_STEPS):
             self._adjust()
@@ -113,7 +114,7 @@ class Search:
             self._reject()
         return [mark.met for mark in self.marks if mark.met is not None]
 
-    def again(self, contacts: Sequence[tuple[int, int]]) -> list[Meeting]:
+    def again(self, contacts: Sequence[tuple[int, int]]) -> list[GivenImpact]:
         """Return the impacts outside the given contacts."""
         outside = [
             mark
@@ -233,8 +234,8 @@ class Search:
             if met is None:
                 self.marks[k] = _Mark(mark.place, _UNCLEAR, min(gain, 0.0))
                 continue
-            place = met.place
-            sharp = met.place_stderr < _SHARP
+            place = met.time / interval
+            sharp = met.time_stderr < _SHARP * interval
             margin = _LOCATED if sharp else _UNCLEAR
             self.marks[k] = _Mark(place, margin, gain, met)
             moved = max(moved, abs(place - mark.place))

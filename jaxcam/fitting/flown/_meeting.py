@@ -1,41 +1,13 @@
 """Locate the impact between two flights, at the time at which their gaps agree."""
 
-from typing import NamedTuple
-
 import numpy as np
 
+from ...recordings.cut import GivenImpact
 from ._windows import Flights
 
 
 # Number of points per sampling interval at which the gaps of two flights are compared
 _FINE = 16
-
-
-class Meeting(NamedTuple):
-    """An impact between two flights of the model.
-
-    Speeds are rates of change of the gap, negative before the impact and positive after
-    it.
-    """
-
-    place: float
-    """Time of the impact, in samples."""
-    place_stderr: float
-    """Standard error of `place`."""
-    side: int
-    """Index of the gap that closes."""
-    gap: float
-    """Gap at the impact."""
-    gap_stderr: float
-    """Standard error of `gap`."""
-    before: float
-    """Rate of change of the gap before the impact."""
-    before_stderr: float
-    """Standard error of `before`."""
-    after: float
-    """Rate of change of the gap after the impact."""
-    after_stderr: float
-    """Standard error of `after`."""
 
 
 def meeting(
@@ -45,8 +17,9 @@ def meeting(
     bounds: tuple[int, int],
     interval: float,
     reach: int,
-) -> Meeting | None:
+) -> GivenImpact | None:
     """Return the impact between two windows, or `None` if no gap jumps upwards there.
+    Its time is measured from the first sample.
 
     **Arguments:** the rows of the windows before and after the impact; `bounds`: the
     last sample before it and the first after it, which `reach` may extend.
@@ -64,7 +37,7 @@ def meeting(
     return min(shown, key=lambda one: abs(one.gap), default=None)
 
 
-def _at_gap(flights, left, right, side, span, interval) -> Meeting | None:
+def _at_gap(flights, left, right, side, span, interval) -> GivenImpact | None:
     begin, end = span
     rows = np.arange(begin, end + 1)
 
@@ -106,9 +79,9 @@ def _at_gap(flights, left, right, side, span, interval) -> Meeting | None:
     shares = np.array([speeds[1], -speeds[0]])
     total = float(np.sum(shares))
     shares = shares / total if np.all(shares > 0) else np.full(2, 0.5)
-    return Meeting(
-        float(place),
-        spread / (abs(speeds[1] - speeds[0]) * interval),
+    return GivenImpact(
+        float(place) * interval,
+        spread / abs(speeds[1] - speeds[0]),
         side,
         float(shares[0] * there(before[0]) + shares[1] * there(after[0])),
         float(np.hypot(shares[0] * errors[0][0], shares[1] * errors[1][0])),
