@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcam.hybrid import Settings, stroboscope
+from jaxcam.hybrid import HybridSystem, Settings, stroboscope
 from jaxcam.models import CamFollower, ImpactOscillator
 
 
@@ -14,6 +14,27 @@ class _WrongPeriod(ImpactOscillator):
     @property
     def period(self):
         return 1.07 * 2 * jnp.pi / self.omega
+
+
+class _TwoStops(HybridSystem):
+    """Two stops that are one constraint: contacts at -1 and at 1 are different."""
+
+    push: float = 0.9
+    slow: float = 0.0
+
+    @property
+    def period(self):
+        return jnp.asarray(jnp.pi)
+
+    def vector_field(self, t, state):
+        push = self.push * jnp.cos(2 * t) * jnp.cos(self.slow * t)
+        return jnp.stack([state[1], push + 0.6 * state[0] - 0.2 * state[1]])
+
+    def gap(self, t, state):
+        return 1.0 - state[0] ** 2
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -0.3 * state[1]])
 
 
 def _both(system, states, turns, **options):
@@ -44,6 +65,7 @@ CASES = {
         _starts(-1.5, -0.1),
         {"t0": 2.0},
     ),
+    "two surfaces": (_TwoStops(), _starts(-0.9, 0.9), {}),
 }
 
 
@@ -78,3 +100,11 @@ def test_a_wrong_period_skips_nothing():
     assert np.sum(whole.rests) > 50
     assert np.max(np.abs(skipping.states - whole.states)) < 1e-9
     np.testing.assert_array_equal(skipping.steps, whole.steps)
+
+
+def test_a_contact_at_another_surface_is_not_skipped():
+    """The body changes from one stop to the other: states within 1e-9."""
+    skipping, whole = _both(_TwoStops(push=1.5, slow=0.2), _starts(-0.9, 0.9), 20)
+    assert np.min(whole.states[:, :, 0]) < -0.99 and np.max(whole.states) > 0.99
+    assert np.sum(whole.rests) > 50
+    assert np.max(np.abs(skipping.states - whole.states)) < 1e-9

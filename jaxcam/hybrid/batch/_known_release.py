@@ -4,7 +4,9 @@ In a planar system, time alone determines the state during contact. If the forci
 periodic, a contact that begins within an earlier contact, shifted by whole periods,
 therefore ends at the shifted release of that contact, in the same state. A release is
 used once a second contact has ended in the same way, which also guards against a
-`period` that is not one.
+`period` that is not one; and only for contacts that begin no farther from it than twice
+as far as the earlier ones, because a body may rest on one of several surfaces that
+differ by a turn.
 """
 
 from typing import Any, NamedTuple
@@ -14,22 +16,27 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..codes import RowKind, RUNNING
-from ..loop import Functions, iteration, Jet, LoopState, Plan
+from ..loop import Functions, iteration, Jet, LoopState, Plan, select
 from ._layout import LaneLayout, LaneStart
 
 
 # two releases are the same if their times differ by less than this fraction of the
 # period, and their states by less than this fraction of the scale of the motion
 _SAME = 1e-8
+# a contact that begins farther from the release than the earlier ones, by this factor,
+# is not skipped
+_REACH = 2.0
 
 
 class Release(NamedTuple):
     """The last contact that ended, and the motion after its release."""
 
-    # since when the current contact has lasted
+    # since when the current contact has lasted, and its first state
     began: Any
-    # the contact is known to last from `start` to `end` (s)
+    began_x: tuple
+    # the contact is known to last from `start` to `end` (s), with this first state
     start: Any
+    start_x: tuple
     end: Any
     # state, acceleration and jerk of the gap, and first step
     x: tuple
@@ -85,7 +92,8 @@ def with_releases(start: LaneStart) -> LaneStart:
     state, kinds = start.slots
     count = len(jax.tree.leaves(state))
     number = np.dtype(float)
-    nothing = Release(np.inf, np.inf, np.inf, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+    x, never = (0.0, 0.0), np.inf
+    nothing = Release(never, x, never, x, never, x, 0.0, 0.0, 0.0, 0.0)
     values, structure = jax.tree.flatten(nothing)
     rows = jax.tree.unflatten(structure, range(count, count + len(values)))
     more = np.tile(np.array(values)[:, None], start.numbers.shape[1])
@@ -113,11 +121,13 @@ def _learnt(plan: Plan, known: Release, state: LoopState, record) -> Release:
     for old, new, extent in zip(known.x, state.x, state.extents, strict=True):
         same = same & (jnp.abs(new - old) <= _SAME * (jnp.abs(new) + extent))
     # both contacts end at the same release, so the longer one contains the other
-    start = jnp.where(same, jnp.minimum(known.start + shift, known.began), known.began)
+    longer = same & (known.start + shift < known.began)
     (jet,) = state.jets
     new = Release(
         began=jnp.inf,
-        start=start,
+        began_x=known.began_x,
+        start=jnp.where(longer, known.start + shift, known.began),
+        start_x=select(longer, known.start_x, known.began_x),
         end=state.t,
         x=state.x,
         acceleration=jet.acceleration,
@@ -126,7 +136,10 @@ def _learnt(plan: Plan, known: Release, state: LoopState, record) -> Release:
         confirmed=jnp.where(same, 1.0, 0.0),
     )
     found = jax.tree.map(lambda a, b: jnp.where(ends, a, b), new, known)
-    return found._replace(began=jnp.where(begins, state.t, found.began))
+    return found._replace(
+        began=jnp.where(begins, state.t, found.began),
+        began_x=select(begins, state.x, found.began_x),
+    )
 
 
 def _skipped(plan: Plan, state: LoopState, release: Release) -> LoopState:
@@ -137,6 +150,11 @@ def _skipped(plan: Plan, state: LoopState, release: Release) -> LoopState:
     t = release.end + shift
     stop = jnp.minimum(plan.t0 + (state.stops + 1) * plan.stop_period, plan.t1)
     inside = begin >= release.start + shift - _SAME * period
+    for a, b, first, extent in zip(
+        state.x, release.x, release.start_x, state.extents, strict=True
+    ):
+        reach = _REACH * jnp.abs(first - b) + _SAME * (jnp.abs(b) + extent)
+        inside = inside & (jnp.abs(a - b) <= reach)
     skips = inside & (t < stop) & (state.status == RUNNING)
     zero, no = 0.0 * t, jnp.asarray(False)
     after = state._replace(

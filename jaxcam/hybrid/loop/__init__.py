@@ -21,4 +21,5 @@ from ._run import (
     run_reversible as run_reversible,
 )
 from ._scale import first_extents as first_extents
+from ._select import select as select
 from ._start import starts_behind as starts_behind
