@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ...hybrid.programs import program
-from ._each_record import each_record
+from ._each_record import each_record, of_record
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
@@ -93,23 +93,19 @@ def assemble(
 
     shown = shows_directly(layout, pieces, columns, scales)
 
-    def record(row):
-        row = jnp.asarray(row)
-        near = layout.about(jnp.asarray(point.values)[row])
-        inputs = pieces, extras, point.states, columns, scales, row
-        return assemble_one(near, *inputs, shown)
+    every = pieces, extras, point.states, columns, scales
 
-    args = layout, pieces, extras, point, columns, scales, shown
+    def record(row):
+        values, one = of_record((point.values, every), row)
+        return assemble_one(layout.about(values), *one, shown)
+
+    args = layout, of_record((point.values, every), 0), shown
     return each_record(record, columns.shape[0], (assemble_one, args))
 
 
 @program
-def assemble_one(near, pieces, extras, states, columns, scales, row, shown):
-    """Apply `assemble` to one recording; its index `row` is an argument of the compiled
-    program, so that one program serves all recordings.
-    """
-    one = pieces, extras, states, columns, scales
-    pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
+def assemble_one(near, pieces, extras, states, columns, scales, shown):
+    """Apply `assemble` to one recording, given its arrays."""
     near = near.by(columns, scales)
 
     def model_at(change, start, step):
