@@ -11,7 +11,7 @@ from ..search import (
     FreeSearch,
     Missing,
     Question,
-    rank_candidates,
+    rank_decoys,
     refitted,
     Shuffled,
     Trial,
@@ -102,7 +102,7 @@ def without_a_name(
             found = [one for one in (known, others) if one is not None]
             known = min(found, key=lambda one: one.score, default=None)
         else:
-            rank_candidates(search)
+            rank_decoys(search, known)
         return search, *_needed(search, known, best.bic, seed, by_chance)
 
     # elements with an internal state are tried only if functions may not suffice

@@ -7,7 +7,7 @@ from ._blocks import (
 )
 from ._clock import Clock as Clock
 from ._earlier import (
-    rank_candidates as rank_candidates,
+    rank_decoys as rank_decoys,
     refitted as refitted,
     starting_at as starting_at,
 )

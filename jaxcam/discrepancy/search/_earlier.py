@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from ...fitting import Fit, Problem
 from ...fitting.engine import own_states, Point
-from ..terms import Family, free_basis, Gate, Place, Primitive, terms_of
+from ..terms import Family, free_basis, Gate, Place, Primitive, terms_of, Where
 from ._free_fits import Missing, Subset
 from ._free_search import FreeSearch
 from ._slots import Free
@@ -81,11 +81,20 @@ def refitted(search: FreeSearch, earlier: Sequence[Missing]) -> Missing | None:
     return best
 
 
-def rank_candidates(search: FreeSearch) -> None:
-    """Rank the candidates for the first function of a search that need not run."""
+def rank_decoys(search: FreeSearch, found: Missing) -> None:
+    """Rank the candidates for the first function of a search that need not run, if one
+    of the functions found has a decoy.
+    """
+    if all(one.label not in _labels(search) for one in found.functions):
+        return
     nothing = Subset(search.apart, (), frozenset())
     bare = search.fits.fitted(nothing, search.apart.start, search.policy.iterations)
     search.first = search.leads.ranked(search.apart, bare, True)
+
+
+def _labels(search: FreeSearch) -> set[str]:
+    """Return the labels of the functions of one argument that act in flight."""
+    return {one.name for one in search.families if one.where is Where.FLIGHT}
 
 
 def _for_search(search: FreeSearch, one: Missing) -> tuple[Subset, Point] | None:

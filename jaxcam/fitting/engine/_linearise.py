@@ -118,30 +118,34 @@ def assemble_one(near, pieces, extras, states, columns, scales, shown):
     return chained(found), costs
 
 
-@program
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Predict samples in flight and in contact, and the joints, of all recordings."""
-    return _predicted(layout, pieces, extras, point)
+    every = pieces, extras, point.values, point.states
+
+    def record(row):
+        return _predict_one(layout, *of_record(every, row))
+
+    args = _predict_one, layout, of_record(every, 0)
+    return each_record(record, point.values.shape[0], args)
 
 
-def _predicted(layout, pieces, extras, point):
-    # the number of substeps is the same for all recordings, so that their loops can be
-    # run as one
-    substeps = jnp.max(pieces.substeps)
+@program
+def _predict_one(layout, pieces, extras, values, states):
+    return _predicted_one(layout, pieces, extras, values, states, pieces.substeps)
 
-    def record(pieces, extras, values, states):
-        model = layout.at(values)
-        end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(
-            states, *flight_inputs(pieces)
-        )
-        resting = rested_all(model, pieces, extras)
-        before = jnp.concatenate([states[:1], end[:-1]])
-        joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
-            before, states, *joint_inputs(pieces)
-        )
-        return seen, resting, joints
 
-    return jax.vmap(record)(pieces, extras, *point)
+def _predicted_one(layout, pieces, extras, values, states, substeps):
+    """Predict one recording, given its arrays."""
+    model = layout.at(values)
+    end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(
+        states, *flight_inputs(pieces)
+    )
+    resting = rested_all(model, pieces, extras)
+    before = jnp.concatenate([states[:1], end[:-1]])
+    joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
+        before, states, *joint_inputs(pieces)
+    )
+    return seen, resting, joints
 
 
 @program
@@ -149,7 +153,14 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
     """Return the costs alone, without scores or information; this function can be
     differentiated in reverse mode.
     """
-    seen, resting, off = _predicted(layout, pieces, extras, point)
+    # the number of substeps is the same for all recordings, so that their loops can be
+    # run as one
+    substeps = jnp.max(pieces.substeps)
+
+    def record(*one):
+        return _predicted_one(layout, *one, substeps)
+
+    seen, resting, off = jax.vmap(record)(pieces, extras, *point)
     sensors = tuple(layout.model.sensors.values())
 
     def total(part, predicted):
