@@ -114,20 +114,18 @@ def diagnose(
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
         conditions.report(f"searching at {kind} {location[k] + 1}", None)
-        name = "at_{}_{}".format(*location)
-        folder = None if keep is None else keep / name
+        folder = keep and keep / "at_{}_{}".format(*location)
         return asked(recordings, folder, location, lags).diagnosis
 
     first = asked(recordings, keep)
-    found = first.diagnosis
-    lags = long_lag(found, recordings)
+    lags = long_lag(first.diagnosis, recordings)
     if lags:
         conditions.report("repeating the diagnosis without the lag", None)
         folder = None if keep is None else keep / "without_lag"
         again = asked(recordings, folder, lags=lags, before=first.named)
-        better = more_accurate(again.diagnosis, found)
+        better = more_accurate(again.diagnosis, first.diagnosis)
         first, lags = (again, lags) if better else (first, {})
-        found = first.diagnosis
+    found = first.diagnosis
     odd = odd_record(found.after, policy)
     if odd is not None:
         conditions.report(f"repeating the diagnosis without {odd}", None)

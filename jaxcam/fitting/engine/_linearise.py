@@ -157,8 +157,8 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
     # run as one
     substeps = jnp.max(pieces.substeps)
 
-    def record(*one):
-        return _predicted_one(layout, *one, substeps)
+    def record(pieces, extras, values, states):
+        return _predicted_one(layout, pieces, extras, values, states, substeps)
 
     seen, resting, off = jax.vmap(record)(pieces, extras, *point)
     sensors = tuple(layout.model.sensors.values())
