@@ -32,7 +32,7 @@ class _Predicted(ElementNeed):
         super().__init__(FreeFits((), (), Policy()), None, Policy())
         self.each = [before, after]
 
-    def _promised(self, problem, found):
+    def _promised(self, problem, found, least):
         return self.each.pop(0)
 
 

@@ -13,7 +13,12 @@ from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.evidence._held_out import folds_of
 from jaxcam.discrepancy.search import _extended
 from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
-from jaxcam.fitting.engine import cost_by_recording, free_columns, Weights
+from jaxcam.fitting.engine import (
+    cost_by_recording,
+    free_columns,
+    of_record,
+    Weights,
+)
 from jaxcam.fitting.engine._linearise import assemble_one, Costs
 from jaxcam.fitting.engine._predict import smallest_gap
 from jaxcam.fitting.engine._seen_directly import seen_directly
@@ -79,16 +84,9 @@ def test_normal_equations_do_not_depend_on_how_they_are_compiled(rooms, found):
         states = found.point.states + away * rng.standard_normal(
             found.point.states.shape
         )
-        args = (
-            rooms.layout.about(found.point.values[0]),
-            rooms.pieces,
-            rooms.extras,
-            states,
-            jnp.asarray(columns.local),
-            jnp.asarray(columns.scales),
-            jnp.asarray(0),
-            False,
-        )
+        every = rooms.pieces, rooms.extras, states, columns.local, columns.scales
+        about = rooms.layout.about(found.point.values[0])
+        args = about, *of_record(every, 0), False
         ours, theirs = (
             [np.asarray(leaf) for leaf in jax.tree.leaves(each(*args))]
             for each in (assemble_one, default)
@@ -141,16 +139,9 @@ def test_the_nodes_give_the_normal_equations_of_the_samples(shaken):
     """To 1e-12 of the largest of each kind, in units of the standard errors, with all
     parameters but that of the error free."""
     columns = free_columns(shaken, [n for n in shaken.names if n != "drag"])
-    about = shaken.layout.about(shaken.start.values[0])
-    args = (
-        about,
-        shaken.pieces,
-        shaken.extras,
-        shaken.start.states,
-        jnp.asarray(columns.local),
-        jnp.asarray(columns.scales),
-        jnp.asarray(0),
-    )
+    about, states = shaken.layout.about(shaken.start.values[0]), shaken.start.states
+    every = shaken.pieces, shaken.extras, states, columns.local, columns.scales
+    args = about, *of_record(every, 0)
     (fast, costs), (slow, expected) = (
         jax.tree.map(np.asarray, assemble_one(*args, direct))
         for direct in (False, True)

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxcam.hybrid.programs import is_tracing, program
+from jaxcam.hybrid.programs import _PASSED, is_tracing, program
 
 
 TRACED: list[int] = []
@@ -23,6 +23,15 @@ def test_a_program_is_traced_once_for_each_static_value():
     assert float(_cube(jnp.asarray(3.0))) == 27.0
     assert float(_cube(jnp.asarray(3.0), power=2)) == 9.0
     assert TRACED == [3, 2]
+
+
+def test_what_was_passed_to_the_compiler_is_discarded():
+    """The program is still compiled only once."""
+    TRACED.clear()
+    for start in (1.0, 2.0):
+        _cube(jnp.full(5, start))
+        assert not any(cache.cache_info().currsize for cache in _PASSED)
+    assert TRACED == [3]
 
 
 def test_a_program_may_be_called_inside_any_transformation():

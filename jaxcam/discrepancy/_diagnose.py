@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ..fitting import Fit, Input, Parameter, Sensor, Setup, Turning
-from ..fitting.engine import own_states
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from ._elsewhere import falls_short, sought_elsewhere
@@ -24,11 +23,13 @@ from .search import (
     Clock,
     far_from_data,
     KeptTrials,
+    Missing,
     Question,
     Report,
     rig_question,
     Search,
     setup_question,
+    starting_at,
     system_question,
     Trial,
     Trials,
@@ -105,31 +106,33 @@ def diagnose(
         folder: Path | None,
         location: Location = Location(),
         lags: Mapping[str, float] = MappingProxyType({}),
-        before: Diagnosis | None = None,
-    ) -> Diagnosis:
+        before: _Answer | None = None,
+    ) -> _Answer:
         question = rig.question(runs, location, lags, conditions)
         return _answered(question, folder, conditions, before)
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
         conditions.report(f"searching at {kind} {location[k] + 1}", None)
-        name = "at_{}_{}".format(*location)
-        folder = None if keep is None else keep / name
-        return asked(recordings, folder, location, lags)
+        folder = keep and keep / "at_{}_{}".format(*location)
+        return asked(recordings, folder, location, lags).diagnosis
 
-    found = asked(recordings, keep)
-    lags = long_lag(found, recordings)
+    first = asked(recordings, keep)
+    lags = long_lag(first.diagnosis, recordings)
     if lags:
         conditions.report("repeating the diagnosis without the lag", None)
         folder = None if keep is None else keep / "without_lag"
-        again = asked(recordings, folder, lags=lags, before=found)
-        found, lags = (again, lags) if more_accurate(again, found) else (found, {})
+        again = asked(recordings, folder, lags=lags, before=first.named)
+        better = more_accurate(again.diagnosis, first.diagnosis)
+        first, lags = (again, lags) if better else (first, {})
+    found = first.diagnosis
     odd = odd_record(found.after, policy)
     if odd is not None:
         conditions.report(f"repeating the diagnosis without {odd}", None)
         others = [run for run in recordings if _name_of(run) != odd]
         folder = None if keep is None else keep / "without_one"
-        found = set_aside(found, asked(others, folder, lags=lags), odd)
+        again = asked(others, folder, lags=lags, before=first)
+        found = set_aside(found, again.diagnosis, odd)
     elif falls_short(found):
         found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
     if keep is not None and not conditions.clock.stopped:
@@ -197,16 +200,30 @@ class _Rig:
         )
 
 
+class _Answer(NamedTuple):
+    """A diagnosis, and the fits with functions, the best first, from which a search in
+    some of the same recordings may start.
+    """
+
+    diagnosis: Diagnosis
+    functions: tuple[Missing, ...] = ()
+
+    @property
+    def named(self) -> "_Answer":
+        """The same answer, from which only the named terms are used."""
+        return self._replace(functions=())
+
+
 def _answered(
     question: Question,
     keep: Path | None,
     conditions: _Conditions,
-    before: Diagnosis | None = None,
-) -> Diagnosis:
+    before: _Answer | None = None,
+) -> _Answer:
     """Search for terms, test the result, and return the diagnosis.
 
-    **Arguments:** a diagnosis `before` provides the terms and values from which the
-    search may start.
+    **Arguments:** an answer `before` provides the terms, functions and values from
+    which the search may start.
     """
     case, seed, report, policy, _ = conditions
     ripple = None
@@ -217,7 +234,10 @@ def _answered(
         )
     trials = conditions.trials(question, keep)
     search = Search(trials)
-    known = None if before is None else _again(trials, before.names, before.after)
+    known, earlier = None, ()
+    if before is not None:
+        known = _again(trials, before.diagnosis.names, before.diagnosis.after)
+        earlier = before.functions
     best = search.run()
     if known is not None and known.bic < best.bic:
         best = search.refined(known)
@@ -235,28 +255,26 @@ def _answered(
     # an odd recording is no missing physics: the diagnosis is repeated without it
     odd = odd_record(best.fit, policy) is not None
     if far and not odd:
-        rough = _roughly(question, bare, keep, conditions)
+        rough = _roughly(question, bare, keep, conditions, earlier)
     if rough is not None and not rough.choice.explained(policy):
-        return diagnosis_of(case, *rough, ripple)
+        return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
     if rough is not None and rough.choice.named.best.names:
         # the physics was found, so that the stated noise can be used
         found = rough.choice.named.best
         again = _again(trials, found.names, found.fit)
         if again is not None and again.bic < best.bic:
             best = search.refined(again)
-    choice = choose(question, trials, best, seed, unnamed=not odd)
+    choice = choose(question, trials, best, seed, not odd, earlier)
     if rough is not None and rough.finds and not choice.explained(policy):
-        return diagnosis_of(case, *rough, ripple)
-    return diagnosis_of(case, question, trials, choice, ripple)
+        return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
+    found = diagnosis_of(case, question, trials, choice, ripple)
+    return _Answer(found, choice.functions)
 
 
 def _again(trials: Trials, names: Collection[str], found: Fit) -> Trial | None:
     """Fit the terms of another problem, starting from their strengths there."""
     terms = frozenset(term.name for term in trials.terms if term.name in names)
-    problem = trials.problem
-    point = problem.start._replace(values=found.point.values)
-    # the states were estimated for the nominal parameters
-    point = own_states(problem.layout, problem.pieces, problem.extras, point)
+    point = starting_at(found, trials.problem)
     start = Trial(terms, dataclasses.replace(found, point=point), math.inf, 0, False)
     return trials.attempt(terms, start, trials.policy.iterations)
 
@@ -278,11 +296,16 @@ class _Roughly(NamedTuple):
 
 
 def _roughly(
-    question: Question, bare: Trial, keep: Path | None, conditions: _Conditions
+    question: Question,
+    bare: Trial,
+    keep: Path | None,
+    conditions: _Conditions,
+    earlier: Sequence[Missing] = (),
 ) -> _Roughly | None:
     """Choose terms with joints and noise that allow for errors of the model.
 
-    **Arguments:** `bare`: the fit of the textbook model to complete flights.
+    **Arguments:** `bare`: the fit of the textbook model to complete flights; `earlier`
+    fits with functions.
 
     **Returns:** `None` if single pieces of flight hardly show the errors.
     """
@@ -293,7 +316,7 @@ def _roughly(
         return None
     folder = None if keep is None else keep / "with_model_error"
     trials = conditions.trials(rough, folder)
-    choice = choose(rough, trials, Search(trials).run(), seed)
+    choice = choose(rough, trials, Search(trials).run(), seed, earlier=earlier)
     report("fitting complete flights", None)
     whole = whole_flights(bare.fit, choice.fit, rough.looseness, policy)
     return _Roughly(rough, trials, dataclasses.replace(choice, whole=whole))

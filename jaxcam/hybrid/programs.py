@@ -1,12 +1,16 @@
 """Compile functions with options that shorten compilation."""
 
+import ctypes
 import functools
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
+from jax._src.config import traceback_in_locations_limit
 from jax._src.core import trace_state_clean
+from jax._src.interpreters.pxla import _cached_lowering_to_hlo
+from jax._src.pjit import _pjit_lower
 from jax.core import Tracer
 
 
@@ -18,6 +22,9 @@ T = TypeVar("T")
 # level 2, a value that is needed twice may be rounded in two ways, and derivatives of
 # `min`, `max` and `clip`, which test values for equality, are then wrong.
 _OPTIONS = {"xla_cpu_use_fusion_emitters": False}
+# JAX keeps what it passed to the compiler, which needs more memory than the compiled
+# program: in a diagnosis, several hundred megabytes
+_PASSED = (_pjit_lower, _cached_lowering_to_hlo)
 
 
 def is_traced(tree) -> bool:
@@ -54,6 +61,37 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
-        return (outermost if is_outermost() else inner)(*args, **kwargs)
+        if not is_outermost():
+            return inner(*args, **kwargs)
+        before = _pjit_lower.cache_info().misses
+        # a compiled program contains the Python stack of each of its operations, up to
+        # this depth, which would double its size
+        with traceback_in_locations_limit(0):
+            found = outermost(*args, **kwargs)
+        if _pjit_lower.cache_info().misses != before:
+            _forget_lowered()
+        return found
 
     return call
+
+
+def _forget_lowered() -> None:
+    """Discard the input of the compiler, which compiled programs do not need, and
+    return unused memory to the operating system.
+    """
+    for cache in _PASSED:
+        cache.cache_clear()
+    if _TRIM is not None:
+        _TRIM(0)
+
+
+def _found_trim():
+    """Return the function of the C library that returns unused memory, or `None`."""
+    try:
+        return ctypes.CDLL(None).malloc_trim
+    except (OSError, TypeError, AttributeError):
+        return None
+
+
+# the GNU library keeps memory that the compiler has freed
+_TRIM = _found_trim()

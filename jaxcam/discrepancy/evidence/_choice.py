@@ -1,11 +1,12 @@
 """Choose the explanation of the recordings from the result of a search."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...fitting import Fit
 from ..policy import Policy
-from ..search import Question, Trial, Trials
+from ..search import Missing, Question, Trial, Trials
 from ._differing import Differing, differing
 from ._held_out import held_out, HeldOut
 from ._structure import Structure
@@ -45,6 +46,14 @@ class Choice:
         missing = self.unnamed.found
         return self.named.best.fit if missing is None else missing.fit
 
+    @property
+    def functions(self) -> tuple[Missing, ...]:
+        """The fit with the functions of the choice, and those with others, in order of
+        their evidence.
+        """
+        found, rivals = self.unnamed.found, self.unnamed.rivals
+        return () if found is None else (found, *(one.missing for one in rivals))
+
     def explained(self, policy: Policy) -> bool:
         """Return whether the terms and functions leave only noise."""
         found = self.fit
@@ -52,20 +61,27 @@ class Choice:
 
 
 def choose(
-    question: Question, trials: Trials, found: Trial, seed: int, unnamed: bool = True
+    question: Question,
+    trials: Trials,
+    found: Trial,
+    seed: int,
+    unnamed: bool = True,
+    earlier: Sequence[Missing] = (),
 ) -> Choice:
     """Decide what explains the recordings: named terms, separate parameter values in
     the recordings, or unnamed functions.
 
-    **Arguments:** the question, its fits, the best subset of terms, the seed, and
-    whether unnamed functions are sought.
+    **Arguments:** the question, its fits, the best subset of terms, the seed, whether
+    unnamed functions are sought, and `earlier` fits with functions, with which the
+    search begins.
     """
     policy, textbook = trials.policy, trials.known[frozenset()]
     named = supported(question, trials, found, seed)
     separate = _separate_values(trials, named, textbook)
     functions, useless, predicted = Unnamed(), None, None
     if named.left and unnamed and policy.functions and not separate.settled:
-        functions = without_a_name(question, trials, named.best, named.left, seed)
+        given = question, trials, named.best, named.left, seed
+        functions = without_a_name(*given, earlier)
     rest = _within(trials, textbook, named.best.fit)
     if functions.found is not None:
         missing = functions.found

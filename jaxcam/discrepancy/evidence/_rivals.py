@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from ...fitting import Fit, residuals
+from ...fitting import Fit
 from ..policy import Policy
 from ..search import Missing
 
@@ -68,14 +68,19 @@ def _parts(one: Missing) -> frozenset[str]:
 
 
 def _costs(found: Fit, policy: Policy) -> Float[np.ndarray, " b"]:
-    """Return the cost of the samples of each section of each recording."""
-    problem = found.problem
+    """Return the cost of the samples of each section of each recording; a piece belongs
+    to the section in which it begins.
+    """
+    problem, costs = found.problem, found.costs
     longest = max(part.recording.duration for part in problem.segments)
     edges = np.linspace(0.0, longest, policy.stretches + 1)[1:-1]
-    rows = {name: k for k, name in enumerate(problem.records)}
-    costs = np.zeros((len(rows), policy.stretches))
-    for part in residuals(found):
-        row = rows[part.record]
-        place = np.searchsorted(edges, part.time - problem.begun[row])
-        np.add.at(costs[row], place, (part.value / part.noise) ** 2)
-    return costs.ravel()
+    totals = np.zeros((len(problem.records), policy.stretches))
+    for part, each in (
+        (problem.pieces.flown, costs.flown),
+        (problem.pieces.rested, costs.rested),
+    ):
+        begun = np.asarray(part.start) - problem.begun[:, None]
+        rows = np.arange(len(totals))[:, None]
+        # a contact whose surface is not found gives no information
+        np.add.at(totals, (rows, np.searchsorted(edges, begun)), np.nan_to_num(each))
+    return totals.ravel()

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..policy import Policy
@@ -10,6 +11,8 @@ from ..search import (
     FreeSearch,
     Missing,
     Question,
+    rank_decoys,
+    refitted,
     Shuffled,
     Trial,
     Trials,
@@ -42,14 +45,21 @@ class Unnamed(NamedTuple):
 
 
 def without_a_name(
-    question: Question, trials: Trials, best: Trial, left: list[Structure], seed: int
+    question: Question,
+    trials: Trials,
+    best: Trial,
+    left: list[Structure],
+    seed: int,
+    earlier: Sequence[Missing] = (),
 ) -> Unnamed:
     """Return the functions that explain the residual of the named terms, chosen by
     their evidence.
 
     Two kinds of residual do not count: one near the noise that is small compared with
     the part explained by a named term, and one that the smoothing of dry friction may
-    leave. Functions that the bootstrap samples do not retain are dropped.
+    leave. Functions that the bootstrap samples do not retain are dropped. If one of the
+    `earlier` fits, refitted to these recordings, leaves only noise, nothing else is
+    sought.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     problem = question.problem
@@ -86,7 +96,14 @@ def without_a_name(
             trials.clock,
             bool(question.model_errors),
         )
-        return search, *_needed(search, search.run(), best.bic, seed, by_chance)
+        known = refitted(search, () if elements else earlier)
+        if known is None or search.falls_short(known):
+            others = search.run()
+            found = [one for one in (known, others) if one is not None]
+            known = min(found, key=lambda one: one.score, default=None)
+        else:
+            rank_decoys(search, known)
+        return search, *_needed(search, known, best.bic, seed, by_chance)
 
     # elements with an internal state are tried only if functions may not suffice
     always = policy.elements > 1

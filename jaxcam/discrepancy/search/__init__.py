@@ -6,6 +6,11 @@ from ._blocks import (
     values_of as values_of,
 )
 from ._clock import Clock as Clock
+from ._earlier import (
+    rank_decoys as rank_decoys,
+    refitted as refitted,
+    starting_at as starting_at,
+)
 from ._extended import extended as extended, with_states as with_states
 from ._free_fits import Missing as Missing
 from ._free_search import FreeSearch as FreeSearch

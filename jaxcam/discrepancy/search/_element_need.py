@@ -37,9 +37,11 @@ class ElementNeed:
         **Arguments:** a fit without functions; the predicted gains of adding single
         functions and terms to this fit; and the required gain.
         """
-        promised, best = self._promised(problem, bare), max(gains, default=0.0)
+        best = max(gains, default=0.0)
+        enough = max(least, self.policy.promising * best)
+        promised = self._promised(problem, bare, enough)
         self.preferred = promised > max(least, best)
-        self.comparable = promised > max(least, self.policy.promising * best)
+        self.comparable = promised > enough
 
     def remains(self, problem: Problem, found: Missing | None, least: float) -> bool:
         """Return whether an element may explain what functions leave.
@@ -54,18 +56,19 @@ class ElementNeed:
             return self.comparable
         heat = heat_of(found.fit)
         if heat <= self.policy.near_cost:
-            return self.comparable or self._promised(problem, found) > least
+            return self.comparable or self._promised(problem, found, least) > least
         left = (found.fit.cost - found.fit.problem.samples) / heat
-        return self._promised(problem, found) > max(least, self.policy.explains * left)
+        least = max(least, self.policy.explains * left)
+        return self._promised(problem, found, least) > least
 
-    def _promised(self, problem: Problem, found: Missing) -> float:
+    def _promised(self, problem: Problem, found: Missing, least: float) -> float:
         """Return the largest predicted gain of an element, minus the penalty for its
-        parameters.
+        parameters; at or below `least`, the gain may be that of a rejected resonance.
         """
         if self.driven is None:
             return 0.0
         heat = heat_of(found.fit)
         problem = heated(filled(problem, found.functions), heat)
         response = force_response(problem, found.fit.point, self.fits.free(found))
-        some = worthwhile(problem, response, self.driven, self.policy, heat)
+        some = worthwhile(problem, response, self.driven, self.policy, heat, least)
         return max((grown for grown, _ in some), default=0.0)

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -60,7 +60,7 @@ class Kind:
     - `name`: its name in sentences; `element`: the function that creates an element
       from its parameters; `numbers`: its parameters; `outputs`: names of its strengths;
       `starts`: number of its free motions, which depend on the initial state.
-    - `signals(driven, cells)`: returns, for each set of parameters, the outputs `(r, n,
+    - `signals(driven, cells)`: yields, for each set of parameters, the outputs `(r, n,
       o)` and free motions `(r, n, s)`.
     """
 
@@ -70,7 +70,7 @@ class Kind:
     outputs: tuple[str, ...]
     starts: int
     signals: Callable[
-        [Driven, Sequence[Sequence[float]]], list[tuple[np.ndarray, np.ndarray]]
+        [Driven, Sequence[Sequence[float]]], Iterable[tuple[np.ndarray, np.ndarray]]
     ]
 
     def reach(self, number: Number, values: Sequence[float]) -> float:
@@ -82,17 +82,18 @@ class Kind:
         return number.reach
 
 
+# the signals of all cells at once would need hundreds of megabytes
 def _resonances(driven: Driven, cells):
-    return [resonance_signals(driven, *cell) for cell in cells]
+    return (resonance_signals(driven, *cell) for cell in cells)
 
 
 def _relaxations(driven: Driven, cells):
-    return [relaxation_signals(driven, *cell) for cell in cells]
+    return (relaxation_signals(driven, *cell) for cell in cells)
 
 
 def _hystereses(driven: Driven, cells, loading: int = 1):
     limits, betas, powers = np.array(cells).T
-    return list(zip(*hysteresis_signals(driven, limits, betas, powers, loading)))
+    return zip(*hysteresis_signals(driven, limits, betas, powers, loading))
 
 
 RESONANCE = Kind(

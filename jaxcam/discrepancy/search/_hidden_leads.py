@@ -17,19 +17,25 @@ from ._vibration_scan import periodogram
 
 
 def worthwhile(
-    problem: Problem, response: Response, driven: Driven, policy: Policy, heat: float
+    problem: Problem,
+    response: Response,
+    driven: Driven,
+    policy: Policy,
+    heat: float,
+    least: float = 0.0,
 ) -> list[tuple[float, Promise]]:
     """Return the predicted gains of hidden elements, minus the penalty for their
     parameters.
 
     A resonance that gains less than a force at one frequency with a separate phase in
-    each recording is rejected, because such a force is not driven by the motion.
+    each recording is rejected, because such a force is not driven by the motion. This
+    is tested only if the largest gain exceeds `least`.
     """
     found = []
     for one in promises(problem, response, driven, policy):
         found.append((one.gain / heat - one.hidden.price(problem.samples), one))
     top = max(found, key=lambda each: each[0])
-    if top[0] > 0 and top[1].hidden.kind is RESONANCE:
+    if top[0] > least and top[1].hidden.kind is RESONANCE:
         scan = periodogram(problem, response, policy)
         count = 2 * scan.records + 1
         price = count * math.log(problem.samples) + 2 * math.log(scan.cells)

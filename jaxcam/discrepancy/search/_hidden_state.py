@@ -110,7 +110,8 @@ class Hidden:
 
     def force(self, numbers: Sequence[float]) -> Float[np.ndarray, "r n"]:
         """Return the force of the element for other parameters but equal strengths."""
-        return self._sum(*self.kind.signals(self.driven, [numbers])[0])
+        ((outputs, free),) = self.kind.signals(self.driven, [numbers])
+        return self._sum(outputs, free)
 
     def _sum(self, outputs, free) -> Float[np.ndarray, "r n"]:
         starts = np.einsum("rns,rs->rn", free, self.starts)

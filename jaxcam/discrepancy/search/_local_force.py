@@ -7,7 +7,7 @@ each.
 """
 
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,14 +15,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ...fitting import Problem
+from ...fitting import engine, Problem
 from ...fitting.engine import (
-    chained,
+    each_record,
     eliminate_states,
     filtered_channels,
     free_columns,
     linear_pieces,
     LinearPieces,
+    of_record,
     off_nominal,
     Point,
     prior_information,
@@ -104,17 +105,15 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     stride = stride_of(problem)
     nodes = 2 * problem.pieces.steps // stride + 1
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
-    found = _linear(
-        [problem.layout.about(values) for values in jnp.asarray(point.values)],
-        problem.pieces,
-        problem.weighted(None),
-        point.states,
-        local,
-        scales,
-        nodes,
-        stride,
-        shows_directly(problem.layout, problem.pieces, local, scales),
-    )
+    shown = shows_directly(problem.layout, problem.pieces, local, scales)
+    every = problem.pieces, problem.weighted(None), point.states, local, scales
+
+    def record(row):
+        values, one = of_record((point.values, every), row)
+        return _linear(problem.layout.about(values), *one, nodes, stride, shown)
+
+    args = problem.layout, of_record((point.values, every), 0), nodes, stride, shown
+    found = each_record(record, len(columns.place), (_linear, args))
     part = problem.pieces.flown
     half = stride * np.asarray(part.step)[..., None] / 2
     prior = prior_information(problem, columns, True)
@@ -168,7 +167,8 @@ def blocks_at_nodes(
     names and scales of the strengths.
     """
     width, size = forces.shape[-1], len(response.prior)
-    chain = _chained(_onto(response, forces))
+    each = [_chained(response, r, some) for r, some in enumerate(forces)]
+    chain = jax.tree.map(lambda *parts: np.stack(parts), *each)
     found = jax.tree.map(np.asarray, eliminate_states(chain))
     information, score = [], []
     total = size + width
@@ -217,69 +217,79 @@ def forces_at_nodes(
     return np.asarray(every)[:, :, :: stride_of(problem)]
 
 
-@program
-def _chained(pieces: LinearPieces):
-    """Return the normal equations of all recordings."""
-    return jax.vmap(chained)(pieces)
+def _chained(
+    response: Response, r: int, forces: Float[np.ndarray, "k l p"]
+) -> engine.Blocks:
+    """Return the normal equations of one recording, with a few given forces instead of
+    a free one at each node.
 
-
-def _onto(response: Response, forces: Float[np.ndarray, "r k l p"]) -> LinearPieces:
-    """Return the pieces with a few given forces instead of a free one at each node."""
-    found = response.pieces
-    keep = found.information.shape[-1] - forces.shape[-2]
-    m = response.place.shape[1]
-
-    def onto(rows, forces):
-        return np.concatenate([rows[..., :keep], rows[..., keep:] @ forces], axis=-1)
-
-    half = onto(found.information, forces)
-    information = onto(np.swapaxes(half, -1, -2), forces)
-    slope = onto(found.slope[:, :, None, :], forces)[:, :, 0]
+    The blocks of the forces are summed over the pieces at once, because those of every
+    piece would need gigabytes of memory.
+    """
+    found: LinearPieces = jax.tree.map(lambda part: part[r], response.pieces)
+    n, m = found.later.shape[-1], response.place.shape[1]
+    inner, slope, later = found.information, found.slope, found.later
+    earlier, off = found.earlier[..., :n], found.tied[..., None]
+    across = inner[..., n + m :] @ forces
     # the residual of a joint depends on the forces in the piece before it
-    before = np.concatenate([np.zeros_like(forces[:, :1]), forces[:, :-1]], axis=1)
-    direct = np.zeros((*found.direct.shape[:-1], m + forces.shape[-1]))
-    direct[..., :m] = found.direct[..., :m]
-    pp = np.zeros((len(forces), direct.shape[-1], direct.shape[-1]))
-    p = np.zeros(pp.shape[:2])
-    pp[:, :m, :m], p[:, :m] = found.pp[:, :m, :m], found.p[:, :m]
-    return found._replace(
-        information=information,
-        slope=slope,
-        earlier=onto(found.earlier, before),
-        direct=direct,
-        pp=pp,
-        p=p,
+    before = np.concatenate([np.zeros_like(forces[:1]), forces[:-1]])
+    pushed = found.earlier[..., n + m :] @ before
+    moved = found.direct[..., :m] + found.earlier[..., n : n + m]
+    params = np.concatenate([moved, pushed], axis=-1)
+    sides = np.swapaxes(later, -1, -2), np.swapaxes(earlier, -1, -2)
+
+    def tied(rows):
+        own, previous = (side @ rows for side in sides)
+        return own + np.concatenate([previous[1:], np.zeros_like(previous[:1])])
+
+    ss = inner[:, :n, :n] + sides[0] @ later
+    ss[:-1] += (sides[1] @ earlier)[1:]
+    sp = np.concatenate([inner[:, :n, n : n + m], across[:, :n]], axis=-1)
+    flat = forces.reshape(-1, forces.shape[-1])
+    corner = np.sum(across[:, n : n + m], axis=0)
+    pp = np.block(
+        [
+            [found.pp[:m, :m] + np.sum(inner[:, n : n + m, n : n + m], axis=0), corner],
+            [corner.T, flat.T @ across[:, n + m :].reshape(flat.shape)],
+        ]
     )
+    rows = params.reshape(-1, params.shape[-1])
+    p = np.concatenate(
+        [
+            found.p[:m] + np.sum(slope[:, n : n + m], axis=0),
+            flat.T @ slope[:, n + m :].ravel(),
+        ]
+    )
+    parts: tuple[Any, ...] = (
+        ss,
+        sp + tied(params),
+        slope[:, :n] - tied(off)[..., 0],
+        sides[0] @ earlier,
+        pp + rows.T @ rows,
+        p - rows.T @ off.ravel(),
+    )
+    return engine.Blocks(*parts)
 
 
 @program
 def _linear(
     near, pieces, extras, states, columns, scales, nodes, stride, shown
 ) -> LinearPieces:
-    arrays, others = zip(*(eqx.partition(one, eqx.is_array) for one in near))
-    # the same number for all recordings, so that their loops can be run as one
-    substeps = jnp.max(pieces.substeps)
+    """Linearise one recording, given its arrays."""
+    size = columns.shape[0]
+    near = near.by(columns, scales)
 
-    def record(arrays, pieces, extras, states, columns, scales):
-        pieces = eqx.tree_at(lambda p: p.substeps, pieces, substeps)
-        size = columns.shape[0]
-        near = eqx.combine(arrays, others[0]).by(columns, scales)
+    def model_at(change, start, step):
+        model = near.at(change[:size])
+        force = LocalForce(change[size:], start, stride * step / 2)
+        system = system_with_terms(
+            model.system.base,
+            (*model.system.terms, force),
+            model.system.coordinates,
+        )
+        return eqx.tree_at(lambda m: m.system, model, system)
 
-        def model_at(change, start, step):
-            model = near.at(change[:size])
-            force = LocalForce(change[size:], start, stride * step / 2)
-            system = system_with_terms(
-                model.system.base,
-                (*model.system.terms, force),
-                model.system.coordinates,
-            )
-            return eqx.tree_at(lambda m: m.system, model, system)
-
-        width = size + nodes
-        return linear_pieces(model_at, pieces, extras, states, width, shown)
-
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *arrays)
-    return jax.vmap(record)(stacked, pieces, extras, states, columns, scales)
+    return linear_pieces(model_at, pieces, extras, states, size + nodes, shown)
 
 
 @program

@@ -53,10 +53,11 @@ def roughness(
     best = Roughness(-math.inf, max(policy.function_lengths), unit)
     for length in policy.function_lengths:
         variances = np.append(family.variances(count, length), float(family.jumps))
-        for size in unit * np.asarray(policy.function_sizes):
-            found = _gain(inside, pull, size * np.sqrt(variances), value)
+        sizes = unit * np.asarray(policy.function_sizes)
+        gains = _gains(inside, pull, np.sqrt(variances), sizes, value)
+        for size, found in zip(sizes, gains):
             if found > best.gain:
-                best = Roughness(found, length, float(size))
+                best = Roughness(float(found), length, float(size))
     return best
 
 
@@ -101,14 +102,16 @@ def beside(information, score, free, own, alike: float):
     return inside, size * (kept @ (kept.T @ (unit * pull)))
 
 
-def _gain(inside, pull, spread, value) -> float:
+def _gains(inside, pull, spread, sizes, value) -> Float[np.ndarray, " s"]:
+    """Return the gains for prior standard deviations that are multiples of `spread`."""
     used = spread > 0
     spread, value = spread[used], value[used]
     inside, pull = inside[np.ix_(used, used)], pull[used]
-    # in units of the prior standard deviations; rounding must not make information
-    # negative
+    # one decomposition serves all sizes; rounding must not make information negative
     values, vectors = np.linalg.eigh(inside * np.outer(spread, spread))
-    values = 1 + np.maximum(values, 0.0)
+    values = 1 + np.outer(sizes**2, np.maximum(values, 0.0))
     here = value / spread
-    along = vectors.T @ (spread * pull - here)
-    return float(np.sum(along**2 / values) - here @ here - np.sum(np.log(values)))
+    told, known = vectors.T @ (spread * pull), vectors.T @ here
+    along = np.outer(sizes, told) - np.outer(1 / sizes, known)
+    gains = np.sum(along**2 / values - np.log(values), axis=1)
+    return gains - here @ here / sizes**2

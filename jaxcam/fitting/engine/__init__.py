@@ -13,6 +13,7 @@ from ._columns import (
     reduced as reduced,
 )
 from ._damped_step import damped_step as damped_step
+from ._each_record import each_record as each_record, of_record as of_record
 from ._eliminate import (
     eliminate_states as eliminate_states,
     Reduced as Reduced,
@@ -29,7 +30,6 @@ from ._linear import (
 from ._linearise import (
     assemble as assemble,
     Blocks as Blocks,
-    chained as chained,
     cost_by_recording as cost_by_recording,
     cost_of as cost_of,
     Costs as Costs,

@@ -47,6 +47,15 @@ def each_record(function: Callable[[int], T], records: int, args: Any) -> T:
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *parts)
 
 
+def of_record(arrays: T, row: int) -> T:
+    """Return the arrays of one recording from those of all recordings.
+
+    A program for these arrays does not depend on the number of recordings.
+    """
+    # slices of NumPy, because JAX would compile a program for each shape
+    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[row]), arrays)
+
+
 def kinds(args) -> Hashable:
     """Return the properties of the arguments on which a compiled program depends:
     shapes, types and static values.

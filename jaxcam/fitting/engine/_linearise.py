@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ...hybrid.programs import program
-from ._each_record import each_record
+from ._each_record import each_record, of_record
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
@@ -93,23 +93,19 @@ def assemble(
 
     shown = shows_directly(layout, pieces, columns, scales)
 
-    def record(row):
-        row = jnp.asarray(row)
-        near = layout.about(jnp.asarray(point.values)[row])
-        inputs = pieces, extras, point.states, columns, scales, row
-        return assemble_one(near, *inputs, shown)
+    every = pieces, extras, point.states, columns, scales
 
-    args = layout, pieces, extras, point, columns, scales, shown
+    def record(row):
+        values, one = of_record((point.values, every), row)
+        return assemble_one(layout.about(values), *one, shown)
+
+    args = layout, of_record((point.values, every), 0), shown
     return each_record(record, columns.shape[0], (assemble_one, args))
 
 
 @program
-def assemble_one(near, pieces, extras, states, columns, scales, row, shown):
-    """Apply `assemble` to one recording; its index `row` is an argument of the compiled
-    program, so that one program serves all recordings.
-    """
-    one = pieces, extras, states, columns, scales
-    pieces, extras, states, columns, scales = jax.tree.map(lambda leaf: leaf[row], one)
+def assemble_one(near, pieces, extras, states, columns, scales, shown):
+    """Apply `assemble` to one recording, given its arrays."""
     near = near.by(columns, scales)
 
     def model_at(change, start, step):
@@ -122,30 +118,34 @@ def assemble_one(near, pieces, extras, states, columns, scales, row, shown):
     return chained(found), costs
 
 
-@program
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Predict samples in flight and in contact, and the joints, of all recordings."""
-    return _predicted(layout, pieces, extras, point)
+    every = pieces, extras, point.values, point.states
+
+    def record(row):
+        return _predict_one(layout, *of_record(every, row))
+
+    args = _predict_one, layout, of_record(every, 0)
+    return each_record(record, point.values.shape[0], args)
 
 
-def _predicted(layout, pieces, extras, point):
-    # the number of substeps is the same for all recordings, so that their loops can be
-    # run as one
-    substeps = jnp.max(pieces.substeps)
+@program
+def _predict_one(layout, pieces, extras, values, states):
+    return _predicted_one(layout, pieces, extras, values, states, pieces.substeps)
 
-    def record(pieces, extras, values, states):
-        model = layout.at(values)
-        end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(
-            states, *flight_inputs(pieces)
-        )
-        resting = rested_all(model, pieces, extras)
-        before = jnp.concatenate([states[:1], end[:-1]])
-        joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
-            before, states, *joint_inputs(pieces)
-        )
-        return seen, resting, joints
 
-    return jax.vmap(record)(pieces, extras, *point)
+def _predicted_one(layout, pieces, extras, values, states, substeps):
+    """Predict one recording, given its arrays."""
+    model = layout.at(values)
+    end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(
+        states, *flight_inputs(pieces)
+    )
+    resting = rested_all(model, pieces, extras)
+    before = jnp.concatenate([states[:1], end[:-1]])
+    joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
+        before, states, *joint_inputs(pieces)
+    )
+    return seen, resting, joints
 
 
 @program
@@ -153,7 +153,14 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
     """Return the costs alone, without scores or information; this function can be
     differentiated in reverse mode.
     """
-    seen, resting, off = _predicted(layout, pieces, extras, point)
+    # the number of substeps is the same for all recordings, so that their loops can be
+    # run as one
+    substeps = jnp.max(pieces.substeps)
+
+    def record(pieces, extras, values, states):
+        return _predicted_one(layout, pieces, extras, values, states, substeps)
+
+    seen, resting, off = jax.vmap(record)(pieces, extras, *point)
     sensors = tuple(layout.model.sensors.values())
 
     def total(part, predicted):

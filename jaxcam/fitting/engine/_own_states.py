@@ -50,16 +50,21 @@ def own_states(
     point, `others`, and predictions from the neighbouring pieces. For each piece, the
     best fit is kept.
     """
-    alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
-    count = np.asarray(jnp.sum(pieces.flown.known, axis=(-3, -2, -1)))
-    blocks, costs = states_only(layout, alone, extras, point)
-    before = np.asarray(costs.flown)
-    step = _step(blocks, 0.0)
-    moved = Point(point.values, point.states + step)
-    _, costs = states_only(layout, alone, extras, moved)
-    after = np.asarray(costs.flown)
+    # with NumPy, because JAX would compile each operation for each number of recordings
+    alone = eqx.tree_at(lambda p: p.joint, pieces, np.zeros_like(pieces.joint))
+    count = np.sum(np.asarray(pieces.flown.known), axis=(-3, -2, -1))
+    start = np.asarray(point.states)
+
+    def about(states):
+        at = Point(point.values, jnp.asarray(states))
+        blocks, costs = states_only(layout, alone, extras, at)
+        return np.asarray(blocks.ss), np.asarray(blocks.s), np.asarray(costs.flown)
+
+    ss, s, before = about(start)
+    moved = start + _step(ss, s, np.zeros(count.shape))
+    *_, after = about(moved)
     better = (count < _FEW) & (after < before)
-    states = np.where(better[..., None], moved.states, point.states)
+    states = np.where(better[..., None], moved, start)
     cost = np.where(better, after, before)
 
     def far():
@@ -68,7 +73,7 @@ def own_states(
 
     def offer(start):
         nonlocal states, cost
-        found, reached = _descended(layout, alone, extras, point, start)
+        found, reached = _descended(about, start)
         wins = far() & (reached < np.where(np.isfinite(cost), cost, np.inf))
         states = np.where(wins[..., None], found, states)
         cost = np.where(wins, reached, cost)
@@ -89,47 +94,51 @@ def own_states(
     return Point(point.values, jnp.asarray(states))
 
 
-def _descended(layout, alone, extras, point, start):
-    """Return states and costs from damped Gauss-Newton steps for each piece
-    separately.
+def _descended(about, start: Float[np.ndarray, "r k n"]):
+    """Return states and costs from damped Gauss-Newton steps for each piece separately.
+
+    **Arguments:** `about(states)` returns information and score of the states, and the
+    cost of each piece.
     """
-    start = np.where(np.isfinite(start), start, 0.0)
-    states = jnp.asarray(start)
-    blocks, costs = states_only(layout, alone, extras, Point(point.values, states))
-    cost = jnp.where(jnp.isfinite(costs.flown), costs.flown, jnp.inf)
-    damping = jnp.full(cost.shape, _FIRST_DAMPING)
-    quiet = 0
+    states = np.where(np.isfinite(start), start, 0.0)
+    ss, s, cost = about(states)
+    cost = np.where(np.isfinite(cost), cost, np.inf)
+    damping, quiet = np.full(cost.shape, _FIRST_DAMPING), 0
     for _ in range(_STEPS):
         if quiet == _QUIET:
             break
-        moved = states + _step(blocks, damping)
-        tried, costs = states_only(layout, alone, extras, Point(point.values, moved))
-        better = costs.flown < cost
-        gain = float(jnp.nanmax(jnp.where(better, 1 - costs.flown / cost, 0.0)))
+        moved = states + _step(ss, s, damping)
+        *there, tried = about(moved)
+        better = tried < cost
+        with np.errstate(invalid="ignore", divide="ignore"):
+            gain = np.nanmax(np.where(better, 1 - tried / cost, 0.0), initial=0.0)
         quiet = quiet + 1 if gain < _LITTLE else 0
-        states = jnp.where(better[..., None], moved, states)
-        cost = jnp.where(better, costs.flown, cost)
-        blocks = blocks._replace(
-            ss=jnp.where(better[..., None, None], tried.ss, blocks.ss),
-            s=jnp.where(better[..., None], tried.s, blocks.s),
-        )
-        damping = jnp.where(better, damping / 10, damping * 10)
-        damping = jnp.maximum(damping, _LEAST_DAMPING)
-    return np.asarray(states), np.asarray(cost)
+        states = np.where(better[..., None], moved, states)
+        cost = np.where(better, tried, cost)
+        ss = np.where(better[..., None, None], there[0], ss)
+        s = np.where(better[..., None], there[1], s)
+        damping = np.where(better, damping / 10, damping * 10)
+        damping = np.maximum(damping, _LEAST_DAMPING)
+    return states, cost
 
 
-def _step(blocks, damping):
+def _step(
+    ss: Float[np.ndarray, "r k n n"],
+    s: Float[np.ndarray, "r k n"],
+    damping: Float[np.ndarray, "r k"],
+) -> Float[np.ndarray, "r k n"]:
     """Return Gauss-Newton steps of the states, scaled by the information in the
     samples.
     """
-    known = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
-    unit = jnp.where(known > 0, 1 / jnp.sqrt(jnp.where(known > 0, known, 1.0)), 0.0)
-    scaled = blocks.ss * unit[..., :, None] * unit[..., None, :]
-    identity = jnp.broadcast_to(jnp.eye(scaled.shape[-1]), scaled.shape)
-    damping = jnp.broadcast_to(jnp.asarray(damping), known.shape[:-1])
-    scaled = jnp.nan_to_num(scaled + damping[..., None, None] * identity)
-    inverse = jnp.linalg.pinv(scaled, rtol=_BLIND)
-    return unit * jnp.einsum("rkab,rkb->rka", inverse, jnp.nan_to_num(unit * blocks.s))
+    known = np.diagonal(ss, axis1=-2, axis2=-1)
+    known = np.where(np.isfinite(known), known, 0.0)
+    unit = np.where(known > 0, 1 / np.sqrt(np.where(known > 0, known, 1.0)), 0.0)
+    # a diverging derivative gives no information
+    ss, s = (np.nan_to_num(one, posinf=0.0, neginf=0.0) for one in (ss, s))
+    scaled = ss * unit[..., :, None] * unit[..., None, :]
+    scaled = scaled + damping[..., None, None] * np.eye(ss.shape[-1])
+    inverse = np.linalg.pinv(scaled, rcond=_BLIND)
+    return unit * np.einsum("rkab,rkb->rka", inverse, unit * s)
 
 
 @program

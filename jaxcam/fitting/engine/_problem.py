@@ -230,7 +230,7 @@ class Problem:
     def samples(self) -> int:
         """Number of fitted samples in all channels."""
         known = self.pieces.flown.known, self.pieces.rested.known
-        return int(sum(jnp.sum(part) for part in known))
+        return int(sum(np.sum(np.asarray(part)) for part in known))
 
     @property
     def longest_flight(self) -> int:

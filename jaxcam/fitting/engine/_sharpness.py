@@ -55,42 +55,47 @@ def shared_width(free: int, most: int) -> int:
 
 def joint_sharpness(layout: Layout, pieces: Pieces, point: Point, guess) -> Extras:
     """Return the standard errors of the joints, from the drive and the samples."""
+    # with NumPy, because JAX would compile each operation for each number of recordings
     records, width = pieces.joint.shape
     size = point.states.shape[-1]
-    one = jnp.ones((records, width, size))
-    apart = jnp.full(records, 1 / JOINT)
-    extras = Extras(
-        jnp.asarray(guess),
-        Sharpness(one, one, one[..., 0], one, apart),
-        jnp.asarray(pieces.exists, dtype=float),
-        jnp.asarray(pieces.rest_exists, dtype=float),
+    one, apart = np.ones((records, width, size)), np.full(records, 1 / JOINT)
+
+    def extras(flight, impact, gap, piece) -> Extras:
+        sharpness = Sharpness(*map(jnp.asarray, (flight, impact, gap, piece, apart)))
+        weights = (np.asarray(a, float) for a in (pieces.exists, pieces.rest_exists))
+        return Extras(jnp.asarray(guess), sharpness, *map(jnp.asarray, weights))
+
+    joint = np.asarray(pieces.joint)
+    alone = eqx.tree_at(lambda p: p.joint, pieces, np.zeros_like(joint))
+    blocks, _ = states_only(layout, alone, extras(one, one, one[..., 0], one), point)
+    information = np.diagonal(np.asarray(blocks.ss), axis1=-2, axis2=-1)
+    usual = np.array(
+        [
+            np.median(column[column > 0]) if np.any(column > 0) else np.nan
+            for column in information.reshape(-1, size).T
+        ]
     )
-    alone = eqx.tree_at(lambda p: p.joint, pieces, jnp.zeros_like(pieces.joint))
-    blocks, _ = states_only(layout, alone, extras, point)
-    information = jnp.diagonal(blocks.ss, axis1=-2, axis2=-1)
-    usual = jnp.nanmedian(jnp.where(information > 0, information, jnp.nan), axis=(0, 1))
     # an unobserved state component is connected as tightly as the least observable one
-    usual = jnp.where(jnp.isnan(usual), jnp.nanmin(usual), usual)
-    floor = JOINT / jnp.sqrt(usual)
-    flight = jnp.broadcast_to(floor, one.shape)
+    usual = np.where(np.isnan(usual), np.fmin.reduce(usual), usual)
+    flight = np.broadcast_to(JOINT / np.sqrt(usual), one.shape)
     piece = flight / JOINT
     if np.any(np.asarray(pieces.drive_error.angle) > 0):
         # a component determined by the drive is known only as accurately as the drive
-        by_drive = _drive_in_flight(layout, pieces, point)
-        flight = jnp.sqrt(flight**2 + jnp.nan_to_num(by_drive) ** 2)
-    sharp = extras._replace(
-        sharpness=Sharpness(flight, flight, one[..., 0], piece, apart)
-    )
-    inner = jnp.where(jnp.asarray(pieces.joint) == IMPACT, 0, pieces.joint)
+        by_drive = np.asarray(_drive_in_flight(layout, pieces, point))
+        flight = np.sqrt(flight**2 + np.nan_to_num(by_drive) ** 2)
+    sharp = extras(flight, flight, one[..., 0], piece)
+    inner = np.where(joint == IMPACT, 0, joint)
     flights = eqx.tree_at(lambda p: p.joint, pieces, inner)
     blocks, _ = states_only(layout, flights, sharp, point)
     known = _IMPACT**2 * _variances(np.asarray(blocks.ss), np.asarray(blocks.before))
     before = np.concatenate([known[:, :1], known[:, :-1]], axis=1)
-    known = jnp.asarray(np.minimum(known, before))
-    slope, by_drive = _drive_slopes(layout, pieces, point)
-    gap = jnp.sqrt(jnp.sum(slope**2 * known, axis=-1) + by_drive[..., -1] ** 2)
-    impact = jnp.sqrt(known + by_drive[..., :-1] ** 2)
-    return extras._replace(sharpness=Sharpness(flight, impact, gap, piece, apart))
+    known = np.minimum(known, before)
+    slope, by_drive = map(np.asarray, _drive_slopes(layout, pieces, point))
+    # padding may not be finite
+    with np.errstate(over="ignore", invalid="ignore"):
+        gap = np.sqrt(np.sum(slope**2 * known, axis=-1) + by_drive[..., -1] ** 2)
+        impact = np.sqrt(known + by_drive[..., :-1] ** 2)
+    return extras(flight, impact, gap, piece)
 
 
 def states_only(layout: Layout, pieces: Pieces, extras: Extras, point: Point):

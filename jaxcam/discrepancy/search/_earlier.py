@@ -1,0 +1,185 @@
+"""Fit the functions that were found in more recordings to some of them alone."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import least_squares
+
+from ...fitting import Fit, Problem
+from ...fitting.engine import own_states, Point
+from ..terms import Family, free_basis, Gate, Place, Primitive, terms_of, Where
+from ._free_fits import Missing, Subset
+from ._free_search import FreeSearch
+from ._slots import Free
+
+
+# Number of points at which a function of another range is compared with the same
+# function
+_GRID = 400
+
+
+def starting_at(found: Fit, problem: Problem) -> Point:
+    """Return the point of a fit as the start of another problem, which has some of its
+    recordings.
+
+    The states are those of the fit in recordings that are divided into the same pieces;
+    in the others, they are estimated from the samples.
+    """
+    values = np.array(problem.start.values)
+    rows = [found.problem.records.index(name) for name in problem.records]
+    known = np.asarray(found.point.values)[rows]
+    for column, name in enumerate(problem.names):
+        if name in found.problem.names:
+            values[:, column] = known[:, found.problem.names.index(name)]
+    point = problem.start._replace(values=jnp.asarray(values))
+    if _divided_alike(found.problem, problem, rows):
+        return point._replace(states=jnp.asarray(np.asarray(found.point.states)[rows]))
+    return own_states(problem.layout, problem.pieces, problem.extras, point)
+
+
+def _divided_alike(one: Problem, other: Problem, rows: Sequence[int]) -> bool:
+    """Return whether the recordings of a problem are divided as in another one, where
+    they have the indices `rows`.
+    """
+    for name in ("start", "step", "value"):
+        mine = np.asarray(getattr(one.pieces.flown, name))[rows]
+        if not np.array_equal(mine, np.asarray(getattr(other.pieces.flown, name))):
+            return False
+    return True
+
+
+def refitted(search: FreeSearch, earlier: Sequence[Missing]) -> Missing | None:
+    """Fit functions and terms found in more recordings to those of a search.
+
+    All fits count as tried by the search, because recordings left out may have affected
+    their order.
+
+    **Returns:** the fit with the most evidence, or `None` if there is none.
+    """
+    best, candidates = None, [one for one in earlier if one.functions]
+    for one in candidates:
+        if search.clock.over:
+            break
+        known = _for_search(search, one)
+        if known is None:
+            continue
+        subset, point = known
+        names = ", ".join(part.label for part in subset.functions)
+        search.progress(f"fitting again {names}", None)
+        beaten = math.inf
+        if best is not None:
+            beaten = search.policy.form_cost * best.fit.cost
+        trial = search.fits.fitted(subset, point, search.policy.iterations, beaten)
+        if not math.isfinite(trial.score) or not _sound(trial):
+            continue
+        search.tried.append(trial)
+        if best is None or trial.score < best.score:
+            best = trial
+    return best
+
+
+def rank_decoys(search: FreeSearch, found: Missing) -> None:
+    """Rank the candidates for the first function of a search that need not run, if one
+    of the functions found has a decoy.
+    """
+    if all(one.label not in _labels(search) for one in found.functions):
+        return
+    nothing = Subset(search.apart, (), frozenset())
+    bare = search.fits.fitted(nothing, search.apart.start, search.policy.iterations)
+    search.first = search.leads.ranked(search.apart, bare, True)
+
+
+def _labels(search: FreeSearch) -> set[str]:
+    """Return the labels of the functions of one argument that act in flight."""
+    return {one.name for one in search.families if one.where is Where.FLIGHT}
+
+
+def _for_search(search: FreeSearch, one: Missing) -> tuple[Subset, Point] | None:
+    """Return functions and terms for the problem of a search, and a starting point;
+    `None` if it has no place for them.
+    """
+    problem, families = search.problem, {f.name: f for f in search.families}
+    labels = {getattr(term, "label", "") for term in terms_of(problem.model)}
+    point = starting_at(one.fit, problem)
+    values, functions = np.array(point.values), []
+    for part in one.functions:
+        if not isinstance(part, Free) or part.slot not in labels:
+            return None
+        numbers = np.array([one.fit[name].value for name in part.coefficients])
+        moved = _over_range(part, numbers, families)
+        if moved is None:
+            return None
+        part, numbers = moved
+        columns = [problem.names.index(name) for name in part.coefficients]
+        values[:, columns] = numbers
+        functions.append(part)
+    subset = Subset(problem, tuple(functions), one.names)
+    return subset, point._replace(values=jnp.asarray(values))
+
+
+def _over_range(
+    one: Free, numbers: np.ndarray, families: dict[str, Family]
+) -> tuple[Free, np.ndarray] | None:
+    """Return a function with the ranges of other recordings, and the parameters with
+    which it is closest to the given one; `None` if no family has its argument.
+    """
+    family = _alike(one.family, families)
+    if family is None:
+        return None
+    if one.primitive is None:
+        along = np.linspace(family.low, family.high, _GRID)
+        old, new = (free_basis(f, along, len(numbers)) for f in (one.family, family))
+        numbers = np.linalg.lstsq(new, old @ numbers, rcond=1e-6)[0]
+        return dataclasses.replace(one, family=family), numbers
+    count, gate = one.primitive.count, one.gate
+    moved = _closest(one.primitive, numbers[:count], one.family, family)
+    if gate is not None:
+        other = _alike(gate.family, families)
+        if other is None:
+            return None
+        own = np.append(1.0, numbers[count:])
+        own = _closest(gate.primitive, own, gate.family, other)
+        moved = np.append(own[0] * moved[0], [*moved[1:], *own[1:]])
+        gate = Gate(other, gate.primitive)
+    return dataclasses.replace(one, family=family, gate=gate), moved
+
+
+def _alike(family: Family, families: dict[str, Family]) -> Family | None:
+    """Return the family with the same argument and place; a centre that was moved is
+    kept.
+    """
+    found = families.get(family.name)
+    return found and dataclasses.replace(found, middle=family.middle)
+
+
+def _closest(
+    form: Primitive, numbers: np.ndarray, old: Family, new: Family
+) -> np.ndarray:
+    """Return the parameters of a form for another range of its argument."""
+    if (old.low, old.high) == (new.low, new.high):
+        return numbers
+    along = np.linspace(new.low, new.high, _GRID)
+    turned = np.sign(along) if new.jumps else np.zeros(_GRID)
+    there, here = (Place.between(along, f.low, f.high) for f in (old, new))
+    wanted = np.broadcast_to(form.value(there, numbers, turned), along.shape)
+    start, width = np.array(numbers, dtype=float), new.high - new.low
+    for k in form.places:
+        start[k] = (old.low + numbers[k] * (old.high - old.low) - new.low) / width
+
+    def off(moved):
+        return np.broadcast_to(form.value(here, moved, turned), along.shape) - wanted
+
+    sizes = np.array([abs(numbers[0]) or 1.0, *form.scales])
+    return least_squares(off, start, x_scale=sizes).x
+
+
+def _sound(trial: Missing) -> bool:
+    """Return whether the forms of a fit have valid parameters."""
+    return all(
+        one.within([trial.fit[name].value for name in one.coefficients])
+        for one in trial.functions
+        if isinstance(one, Free) and one.primitive is not None
+    )
