@@ -1,5 +1,6 @@
 """Compile functions with options that shorten compilation."""
 
+import contextlib
 import ctypes
 import functools
 from collections.abc import Callable
@@ -7,10 +8,9 @@ from typing import Any, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
-from jax._src.config import traceback_in_locations_limit
+from jax._src import config, pjit
 from jax._src.core import trace_state_clean
-from jax._src.interpreters.pxla import _cached_lowering_to_hlo
-from jax._src.pjit import _pjit_lower
+from jax._src.interpreters import pxla
 from jax.core import Tracer
 
 
@@ -23,8 +23,11 @@ T = TypeVar("T")
 # `min`, `max` and `clip`, which test values for equality, are then wrong.
 _OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 # JAX keeps what it passed to the compiler, which needs more memory than the compiled
-# program: in a diagnosis, several hundred megabytes
-_PASSED = (_pjit_lower, _cached_lowering_to_hlo)
+# program: in a diagnosis, several hundred megabytes. These caches, and the setting
+# below, are not public; without them, a program needs more memory
+_LOWERED = getattr(pjit, "_pjit_lower", None)
+_PASSED = (_LOWERED, getattr(pxla, "_cached_lowering_to_hlo", None))
+_STACK_DEPTH = getattr(config, "traceback_in_locations_limit", None)
 
 
 def is_traced(tree) -> bool:
@@ -63,16 +66,21 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
         if not is_outermost():
             return inner(*args, **kwargs)
-        before = _pjit_lower.cache_info().misses
+        before = _lowered()
         # a compiled program contains the Python stack of each of its operations, up to
         # this depth, which would double its size
-        with traceback_in_locations_limit(0):
+        with contextlib.nullcontext() if _STACK_DEPTH is None else _STACK_DEPTH(0):
             found = outermost(*args, **kwargs)
-        if _pjit_lower.cache_info().misses != before:
+        if _lowered() != before:
             _forget_lowered()
         return found
 
     return call
+
+
+def _lowered() -> int:
+    """Return the number of programs that have been passed to the compiler."""
+    return 0 if _LOWERED is None else _LOWERED.cache_info().misses
 
 
 def _forget_lowered() -> None:
@@ -80,7 +88,8 @@ def _forget_lowered() -> None:
     return unused memory to the operating system.
     """
     for cache in _PASSED:
-        cache.cache_clear()
+        if cache is not None:
+            cache.cache_clear()
     if _TRIM is not None:
         _TRIM(0)
 
