@@ -1,6 +1,7 @@
 """The likelihood of a free function, to second order in its coefficients.
 
-It predicts how well a parametric form would explain the data, without a fit.
+It predicts how well a parametric form would explain the data, without integrating a
+trajectory.
 """
 
 import functools
@@ -10,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import least_squares
 
 from ..terms import Family, free_basis, Place, Primitive
 from ._free_fits import FreeFits, heat_of, Missing, Subset
@@ -19,6 +21,10 @@ from ._slots import Free
 
 # Number of points at which a form is compared with the sines that represent it
 _GRID = 400
+# Maximum number of evaluations when the parameters of a form are optimised
+_EVALUATIONS = 40
+# Step of finite differences, relative to a significant change of a parameter
+_STEP = 0.02
 
 
 class Start(NamedTuple):
@@ -90,9 +96,60 @@ def _projection(family: Family, count: int) -> Float[np.ndarray, "k n"]:
     return np.linalg.pinv(free_basis(family, along, count), rcond=1e-6)
 
 
+class Vectors:
+    """Functions as vectors, scaled so that the cost of a function exceeds the minimum
+    by the squared distance from `best`, the vector of the most likely function.
+    """
+
+    def __init__(self, likelihood: CurveLikelihood):
+        self.likelihood = likelihood
+        values, vectors = np.linalg.eigh(likelihood.information)
+        # directions without information are left out
+        least = len(values) * np.finfo(float).eps * np.max(values, initial=0.0)
+        kept = values > least
+        self.root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+        told = vectors[:, kept].T @ likelihood.slope
+        self.best = told / np.sqrt(values[kept])
+
+    def seen(self, form: Primitive, numbers: np.ndarray) -> np.ndarray:
+        """Return a form as a vector, or as one vector for each set of parameters."""
+        sines = self.likelihood.sines_of(form, np.atleast_2d(numbers))
+        seen = sines @ self.root.T
+        return seen if numbers.ndim > 1 else seen[0]
+
+    def slopes(self, form: Primitive, numbers, scales) -> Float[np.ndarray, "k p"]:
+        """Return the derivatives of a form with respect to its parameters, in units of
+        their significant changes, `scales`.
+        """
+        steps = numbers + _STEP * np.diag(scales)
+        return (self.seen(form, steps) - self.seen(form, numbers)).T / _STEP
+
+    def refined(self, form: Primitive, start: np.ndarray) -> Start:
+        """Return a form with its parameters optimised; they may become invalid."""
+        scales = np.array([abs(start[0]), *form.scales])
+        # a step to parameters for which the form is not finite is shortened
+        with np.errstate(over="ignore", invalid="ignore"):
+            result = least_squares(
+                lambda steps: self.seen(form, start + scales * steps) - self.best,
+                np.zeros(len(start)),
+                jac=lambda steps: self.slopes(  # pyright: ignore[reportArgumentType]
+                    form, start + scales * steps, scales
+                ),
+                max_nfev=_EVALUATIONS,
+            )
+        gain = float(self.best @ self.best - result.fun @ result.fun)
+        gain -= form.count * self.likelihood.price
+        return Start(gain, form, start + scales * result.x)
+
+
 def promising(likelihood: CurveLikelihood, most: int) -> list[Start]:
-    """Return the forms with the largest predicted gains, at most `most` of them."""
-    ranked = []
+    """Return the forms with the largest predicted gains, at most `most` of them.
+
+    The parameters are optimised from the best starting values. If the data determine a
+    function precisely, the distance to the nearest starting values would otherwise cost
+    more than a wrong form does.
+    """
+    ranked, vectors = [], Vectors(likelihood)
     for primitive in likelihood.family.primitives:
         starts = likelihood.starts_of(primitive)
         sines = likelihood.sines_of(primitive, starts)
@@ -105,6 +162,9 @@ def promising(likelihood: CurveLikelihood, most: int) -> list[Start]:
         if size != 0:
             numbers = np.array([size, *starts[k][1:]])
             gain = gains[k] - primitive.count * likelihood.price
-            ranked.append(Start(float(gain), primitive, numbers))
+            best = Start(float(gain), primitive, numbers)
+            better = vectors.refined(primitive, numbers)
+            sound = primitive.within(better.numbers) and better.gain > best.gain
+            ranked.append(better if sound else best)
     ranked.sort(key=lambda each: -each.gain)
     return ranked[:most]

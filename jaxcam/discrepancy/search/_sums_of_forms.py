@@ -11,20 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import least_squares
 
 from ..terms import MOST_PARTS, Primitive, sum_of
-from ._curve_likelihood import CurveLikelihood, Start
+from ._curve_likelihood import CurveLikelihood, Start, Vectors
 
 
 # Squared correlation above which the data do not distinguish two forms
 _ALIKE = 0.95
-# Number of sums of each size that are refined, and maximum number of evaluations
-_REFINED, _EVALUATIONS = 8, 40
+# Number of sums of each size that are refined
+_REFINED = 8
 # Minimum increase in gain for which a part is replaced by another
 _MORE = 0.1
-# Step of finite differences, relative to a significant change of a parameter
-_STEP = 0.02
 
 
 class _Sum(NamedTuple):
@@ -70,7 +67,7 @@ class _Grid(NamedTuple):
 
     - `rows`: for each form, the rows that belong to it.
     - `numbers`: for each form, the parameters of these rows.
-    - `seen`: for each row, the vector of the form (see `SumSearch`), scaled to length
+    - `seen`: for each row, the vector of the form (see `Vectors`), scaled to length
         one; `sizes`: the size parameters of the scaled forms.
     """
 
@@ -95,21 +92,16 @@ class _Grid(NamedTuple):
 class SumSearch:
     """A search for sums of forms that are about as likely as a function.
 
-    A function is represented by a vector, scaled so that the cost of the function
-    exceeds the minimum by the squared distance from `best`, the vector of the most
-    likely function.
+    A function is represented by one of the `Vectors`.
 
     **Arguments:** the likelihood, and the minimum squared length of a part of a sum,
-    relative to that of `best`.
+    relative to that of the most likely function.
     """
 
     def __init__(self, likelihood: CurveLikelihood, least: float = 0.0):
         self.likelihood, self.least = likelihood, least
-        values, vectors = np.linalg.eigh(likelihood.information)
-        kept = values > 0
-        self.root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-        told = vectors[:, kept].T @ likelihood.slope
-        self.best = told / np.sqrt(values[kept])
+        self.vectors = Vectors(likelihood)
+        self.best = self.vectors.best
         self.grid = self._grid()
 
     def promising(self, most: int) -> list[Start]:
@@ -143,7 +135,7 @@ class SumSearch:
         for form in self.likelihood.family.summands:
             starts = self.likelihood.starts_of(form)
             starts = starts[[form.within(own) for own in starts]]
-            here = self.likelihood.sines_of(form, starts) @ self.root.T
+            here = self.vectors.seen(form, starts)
             size = np.linalg.norm(here, axis=1)
             visible = size > 0
             if not np.any(visible):
@@ -191,8 +183,8 @@ class SumSearch:
         Changes in the parameters of the sum are taken into account to first order.
         """
         grid, price = self.grid, self.likelihood.price
-        across = np.linalg.qr(self._slopes(one.form, one.numbers, one.scales))[0]
-        left = self.best - self._seen(one.form, one.numbers)
+        across = np.linalg.qr(self.vectors.slopes(one.form, one.numbers, one.scales))[0]
+        left = self.best - self.vectors.seen(one.form, one.numbers)
         left -= across @ (across.T @ left)
         inside = grid.seen @ across
         squares = 1 - np.sum(inside**2, axis=1)
@@ -209,38 +201,15 @@ class SumSearch:
             gain = float(so_far + gains[row] - form.count * price)
             yield _Sum(gain, (*one.parts, form), np.append(one.numbers, own))
 
-    def _seen(self, form: Primitive, numbers: np.ndarray) -> np.ndarray:
-        """Return a form as a vector, or as one vector for each set of parameters."""
-        sines = self.likelihood.sines_of(form, np.atleast_2d(numbers))
-        seen = sines @ self.root.T
-        return seen if numbers.ndim > 1 else seen[0]
-
-    def _slopes(self, form, numbers, scales) -> Float[np.ndarray, "k p"]:
-        """Return the derivatives of a form with respect to its parameters, in units of
-        their significant changes.
-        """
-        steps = numbers + _STEP * np.diag(scales)
-        return (self._seen(form, steps) - self._seen(form, numbers)).T / _STEP
-
     def _refined(self, sums: Sequence[_Sum]) -> list[_Sum]:
         """Optimise the parameters of sums, and return the sums with valid parameters
         whose parts are all significant.
         """
         found = []
         for one in sums:
-            form, start, scales = one.form, one.numbers, one.scales
-            result = least_squares(
-                lambda steps: self._seen(form, start + scales * steps) - self.best,
-                np.zeros(len(start)),
-                jac=lambda steps: self._slopes(  # pyright: ignore[reportArgumentType]
-                    form, start + scales * steps, scales
-                ),
-                max_nfev=_EVALUATIONS,
-            )
-            gain = float(self.best @ self.best - result.fun @ result.fun)
-            gain -= form.count * self.likelihood.price
-            best = one._replace(gain=gain, numbers=start + scales * result.x)
-            sensible = form.within(best.numbers) and np.isfinite(gain)
+            gain, form, numbers = self.vectors.refined(one.form, one.numbers)
+            best = one._replace(gain=gain, numbers=numbers)
+            sensible = form.within(numbers) and np.isfinite(gain)
             if sensible and self._counts(best):
                 found.append(best)
         return found
@@ -249,7 +218,7 @@ class SumSearch:
         """Return whether every part of a sum is large enough and can be distinguished
         from the others by the data.
         """
-        each = [self._seen(*own) for own in zip(one.parts, one.own)]
+        each = [self.vectors.seen(*own) for own in zip(one.parts, one.own)]
         sizes = np.array([np.linalg.norm(own) for own in each])
         if not np.all(sizes**2 > self.least * (self.best @ self.best)):
             return False
