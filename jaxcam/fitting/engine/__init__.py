@@ -43,6 +43,7 @@ from ._model import (
     DriveState as DriveState,
     filtered_channels as filtered_channels,
     Input as Input,
+    INTERPOLATIONS as INTERPOLATIONS,
     measured_components as measured_components,
     Model as Model,
     primary_channel as primary_channel,
