@@ -255,9 +255,13 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
         for place in np.flatnonzero(row):
             if place in picks:
                 continue
-            name = f"`{names[place]}`" if names else f"component {place} of the state"
+            name, sees = f"component {place} of the state", ""
+            if names:
+                name = f"`{names[place]}`"
+                sees = f'`sees = "{names[place]}"` in the rig file, '
             raise RecordingError(
                 f"{recording.name}: gap {number + 1} depends on {name}, which no "
-                f"channel measures; add a sensor without a bandwidth whose `observe` "
-                f"is {place}."
+                f"channel measures, so impacts cannot be found; measure it, and add a "
+                f"channel for it without a bandwidth ({sees}`Sensor({place}, ...)` in "
+                f"Python)."
             )
