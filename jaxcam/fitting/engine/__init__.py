@@ -11,6 +11,7 @@ from ._columns import (
     prior_cost as prior_cost,
     prior_information as prior_information,
     reduced as reduced,
+    sound_information as sound_information,
 )
 from ._damped_step import damped_step as damped_step
 from ._eliminate import (
