@@ -130,6 +130,26 @@ def test_a_sensor_of_another_gain_and_zero_is_seen_through():
     assert found.rmse["position_m"] < 1e-6
 
 
+def test_an_input_between_whose_samples_a_line_is_drawn():
+    """To the integration error: the exact motion under a force with corners at the
+    samples. Held, the force would be late by half an interval."""
+    force = np.sin(0.02 * np.arange(1000))
+    b, c = Cart().inverse_mass, Cart().viscous
+    x, v, position = 0.1, 0.2, []
+    for level, slope in zip(force, np.append(np.diff(force), 0.0) / INTERVAL):
+        position.append(x)
+        # v' = b (level + slope s) - c v
+        base, rise = b * (level - slope / c) / c, b * slope / c
+        reach = (1 - np.exp(-c * INTERVAL)) / c
+        x = x + base * INTERVAL + rise * INTERVAL**2 / 2 + (v - base) * reach
+        v = base + rise * INTERVAL + (v - base) * np.exp(-c * INTERVAL)
+    run = recorded(np.array(position), force)
+    linear = Input("force_N", _force, "linear")
+    found = free_run(dataclasses.replace(model(), drive=linear), run)
+    assert found.rmse["position_m"] < 1e-8
+    assert free_run(model(), run).rmse["position_m"] > 1e-5
+
+
 def test_lost_samples_do_not_count():
     force = pushed(4)
     position = carted(force, 0.1, 0.2)

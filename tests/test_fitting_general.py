@@ -10,8 +10,10 @@ from fitting_rigs import DraggedBall
 from jaxcam import fitting
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.evidence._held_out import folds_of
+from jaxcam.fitting.engine import sound_information
+from jaxcam.fitting.engine._columns import Columns
 from jaxcam.fitting.engine._likelihood import score
-from jaxcam.fitting.engine._linearise import cost_of
+from jaxcam.fitting.engine._linearise import Blocks, cost_of
 from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall, PowerLawRestitution
 from jaxcam.recordings import mend, record, Recording, RecordingError, segment
@@ -309,6 +311,23 @@ def test_a_pair_that_is_seen_only_together(direction, words):
     sentences = report.sentences()
     assert sentences[0].startswith("The data determine 1 of 2")
     assert words in sentences[1]
+
+
+def test_a_recording_whose_information_is_lost_to_rounding_is_not_counted():
+    """One state and one parameter: the information pp - sp^2 / ss is 1 in the first
+    recording, and -0.001, which no data have, in the second."""
+    ones = jnp.ones((2, 1, 1, 1))
+    pp = jnp.array([2.0, 0.999])[:, None, None]
+    blocks = Blocks(ones, ones, ones[..., 0], 0 * ones, pp, ones[:, 0, 0])
+    indices = np.zeros((2, 1), dtype=int)
+    columns = Columns(indices[0], indices[0] - 1, indices, indices, np.ones(1))
+    information, lost = sound_information(columns, blocks)
+    np.testing.assert_allclose(information, [[1.0]], rtol=1e-12)
+    assert lost.tolist() == [1]
+    report = fitting.Identifiability(
+        ("K",), np.ones((1, 1)), *np.ones((5, 1)), lost=("second",)
+    ).sentences()
+    assert "the motion in second is so sensitive" in report[1]
 
 
 def test_refusals(balls):

@@ -1,4 +1,5 @@
-"""An input that is held between samples, in steps that do not end at samples."""
+"""An input that is held or interpolated between its samples, in steps that do not end
+at samples."""
 
 import jax
 import jax.numpy as jnp
@@ -31,47 +32,55 @@ class Cart(HybridSystem):
         return state
 
 
-def _exact(force):
-    """Position and velocity at the samples, by summation."""
-    h, x, v = _INTERVAL, [0.0], [0.0]
-    for level in _GAIN * force[:-1]:
-        x.append(x[-1] + v[-1] * h + level * h * h / 2)
-        v.append(v[-1] + level * h)
-    return np.array(x), np.array(v)
+def _moved(x, v, level, slope, s):
+    """Position and velocity after a time `s` under a linear force, in closed form."""
+    level, slope = _GAIN * level, _GAIN * slope
+    place = x + v * s + level * s**2 / 2 + slope * s**3 / 6
+    return place, v + level * s + slope * s**2 / 2
 
 
-@pytest.fixture(scope="module")
-def pushed():
-    """A recording with a force that jumps at every sample, and its problem."""
+def _force(system):
+    return system.force
+
+
+@pytest.fixture(scope="module", params=["hold", "linear"])
+def pushed(request):
+    """A recording with a random force at every sample, its problem, and the exact
+    position and velocity at any time."""
     rng = np.random.default_rng(3)
     force = rng.standard_normal(_COUNT)
-    x, v = _exact(force)
+    slopes = np.append(np.diff(force), 0.0) / _INTERVAL
+    slopes = slopes * (request.param == "linear")
+    samples = [(0.0, 0.0)]
+    for level, slope in zip(force[:-1], slopes):
+        samples.append(_moved(*samples[-1], level, slope, _INTERVAL))
+    x = np.array([place for place, _ in samples])
+
+    def at(t):
+        k = min(int(np.floor(t / _INTERVAL + 1e-9)), _COUNT - 2)
+        return np.array(_moved(*samples[k], force[k], slopes[k], t - k * _INTERVAL))
+
     time = _INTERVAL * np.arange(_COUNT)
     noisy = x + _NOISE * rng.standard_normal(_COUNT)
     run = Recording("run", time, {"position_m": noisy, "force_N": force})
     model = Model(
         Cart(),
         {"position_m": Sensor(0, noise=_NOISE)},
-        Input("force_N", lambda system: system.force),
+        Input("force_N", _force, request.param),
     )
     gain = Parameter("gain", lambda m: m.system.gain, tolerance=0.5)
     parts = [segment(run, "position_m", None, noise=_NOISE)]
-    return Problem.build(model, parts, [gain]), time, x, v
+    return Problem.build(model, parts, [gain]), at
 
 
 def test_the_end_of_every_piece_is_exact(pushed):
-    """To 1e-12 m and m/s: integral and first moment of the input are those of the held
+    """To 1e-12 m and m/s: integral and first moment of the input are those of its
     samples, although no step ends at a sample."""
-    problem, time, x, v = pushed
+    problem, at = pushed
     pieces, model = problem.pieces, problem.layout.at(problem.start.values[0])
     part, exists = pieces.flown, np.flatnonzero(pieces.exists[0])
     step = np.asarray(part.step)[0, exists]
     assert np.all(np.abs(step / _INTERVAL - np.round(step / _INTERVAL)) > 1e-3)
-
-    def at(t):
-        k = np.minimum(int(np.floor(t / _INTERVAL + 1e-9)), _COUNT - 2)
-        s, level = t - time[k], (v[k + 1] - v[k]) / _INTERVAL
-        return np.array([x[k] + v[k] * s + level * s * s / 2, v[k] + level * s])
 
     count = pieces.steps
     for k in exists:

@@ -1,5 +1,6 @@
 """Recordings cut at the gaps of a model: two bodies that hit a wall and each other."""
 
+import dataclasses
 import functools
 import importlib.util
 from pathlib import Path
@@ -146,6 +147,14 @@ def test_a_gap_that_no_channel_shows_is_refused():
     recording, _ = recorded()
     with pytest.raises(RecordingError, match="gap 2 depends on `x2`, which no channel"):
         segment_by_model(model((("position1_m", 0),)), [recording])
+
+
+def test_times_in_milliseconds_read_as_seconds_are_refused():
+    """A fit would search for minutes: the model oscillates many times per sample."""
+    recording, _ = recorded()
+    slow = dataclasses.replace(recording, time=1e3 * recording.time)
+    with pytest.raises(RecordingError, match="check the unit of the time column"):
+        segment_by_model(model(), [slow])
 
 
 def test_without_a_gap_the_record_is_one_flight():

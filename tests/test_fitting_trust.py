@@ -158,6 +158,7 @@ def test_what_the_data_do_not_constrain_is_named(names, hidden):
     assert all(name in found.message for name in hidden)
     for one in found.estimates:
         assert np.isfinite(one.stderr) == (one.name not in hidden)
+    np.testing.assert_allclose(np.diag(found.correlation), 1.0)
 
 
 class Broken(Swing):

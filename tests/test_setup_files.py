@@ -253,6 +253,16 @@ def test_a_drive_may_have_an_offset_that_is_fitted(tmp_path):
             '[input]\nchannel = "a_V"\nfield = "stiffness"\n[channels',
             "remove the tolerance",
         ),
+        (
+            "[channels",
+            '[input]\nchannel = "a_V"\nfield = "wall"\ninterpolation = "x"\n[channels',
+            'must be "hold" or "linear"',
+        ),
+        (
+            "[channels",
+            '[input]\nchannel = "a_V"\nfield = "wall"\ninterpolate = "hold"\n[channels',
+            "is `interpolation` meant?",
+        ),
         ("[channels", "[input]\n[drive]\n[channels", "both [drive] and [input]"),
         ("[channels", "[input]\nchannel = 3\n[channels", "must be a word"),
         ("[channels", "[references]\ncenter = 1\n[channels", "unknown key `center`"),
@@ -283,6 +293,27 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
         ("state[0] - self.wall", "float(state[0])", "jnp.where instead of if"),
         ("state[0] - self.wall", "(0.0, 1.0)[state[0].astype(int)]", "jax.numpy"),
         ("state[0] - self.wall", "1 / 0", "`gap` of Cart fails (ZeroDivision"),
+        ("return state[0] - self.wall", "state[0]", "`gap` of Cart returns nothing"),
+        (
+            "return jnp.stack([state[1], -self.stiffness * state[0]])",
+            "return state[1], -self.stiffness * state[0]",
+            "`vector_field` of Cart returns a tuple; return an array",
+        ),
+        (
+            "return jnp.stack([state[0], -0.5 * state[1]])",
+            "return jnp.stack([state, state])",
+            "required for its 2 state names; correct",
+        ),
+        (
+            "    teeth",
+            "    period = property(lambda self: self.sped)\n    teeth",
+            "`period` of Cart fails (AttributeError",
+        ),
+        (
+            "    teeth",
+            '    constraint_names = "left", "right"\n    teeth',
+            "2 `constraint_names`, but 1 gap; give",
+        ),
         (
             "    def gap",
             '    def check(self):\n        raise ValueError("Too stiff.")\n    def gap',
@@ -298,6 +329,18 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
 def test_what_is_wrong_with_the_code_is_said(tmp_path, old, new, words):
     assert old in PLAIN
     assert words in refusal(tmp_path, "", "", PLAIN.replace(old, new))
+
+
+def test_a_fault_of_a_branch_is_not_said_of_the_vector_field_that_calls_it(tmp_path):
+    code = PLAIN.replace("HybridSystem", "SwitchedSystem")
+    code = code.replace("from jaxcam import", "from jaxcam.hybrid import")
+    plain = "    def switching(self, t, state):\n        return state[1]\n\n"
+    plain += "    def branch(self, t, state, sides):"
+    code = code.replace("    def vector_field(self, t, state):", plain)
+    short = code.replace("jnp.stack([state[1], -self", "jnp.stack([-self")
+    assert short != code
+    said = refusal(tmp_path, "", "", short)
+    assert "`branch` of Cart has the shape (1,), but (2,) is required" in said
 
 
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))

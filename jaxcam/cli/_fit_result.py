@@ -65,6 +65,13 @@ class Result:
                 " The model is incomplete, or the noise is larger than stated; "
                 "`jaxcam diagnose` with the same files seeks what is missing."
             )
+            drive = self.problem.model.drive
+            if isinstance(drive, fitting.Input) and drive.interpolation == "hold":
+                sentence += (
+                    f" First check that {drive.channel} really keeps its value between "
+                    "two samples; if it is continuous, write `interpolation = "
+                    '"linear"` under [input] in the rig file.'
+                )
         if ratio > _HOPELESS:
             sentence += (
                 " Check the units, the signs and the order of the columns first (deg "

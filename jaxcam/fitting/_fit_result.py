@@ -178,10 +178,13 @@ class Fit:
 
     @property
     def correlation(self) -> Float[np.ndarray, "g g"]:
-        """Correlations of the estimates."""
+        """Correlations of the estimates; zero if the data do not constrain a value."""
         size = np.sqrt(np.diag(self.covariance))
         size = np.where(size > 0, size, 1.0)
-        return self.covariance / np.outer(size, size)
+        found = np.where(np.isinf(self.covariance), 0.0, self.covariance)
+        found = found / np.outer(size, size)
+        np.fill_diagonal(found, 1.0)
+        return found
 
     def ellipse(self, names: Sequence[str], level: float = 0.95) -> Ellipse:
         """Return the joint confidence region of two or more parameters, with all others

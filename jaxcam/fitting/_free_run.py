@@ -90,9 +90,8 @@ def free_run(
     """Simulate a complete recording from its first samples and its input.
 
     The initial state is the one whose motion best fits the first `samples` samples.
-    From there on, the simulation uses only the measured input, held between samples, so
-    errors accumulate over the recording. System-identification benchmarks test a model
-    in this way, whereas a fit tests it piece by piece.
+    From there on, the simulation uses only the measured input, so errors accumulate.
+    System-identification benchmarks test a model in this way, a fit piece by piece.
 
     Args:
         model: A system with its sensors and its input, such as `found.model()`.
@@ -157,14 +156,14 @@ class Prepared(eqx.Module):
 
     `state` `(n,)` is the state at the first sample, estimated from the first `samples`;
     `start` and `interval` (s) are the time of that sample and the sampling interval;
-    `level` `(k,)` is the input; `data` `(k, c)` are the samples, `noise` `(c,)` their
-    noise; `steps` is the number of integration steps between two samples.
+    `drive` is the input at each sample, with its slope, `(k,)`; `data` `(k, c)` are the
+    samples, `noise` `(c,)` their noise; `steps` are the integration steps per sample.
     """
 
     state: Float[Array, " n"]
     start: Float[Array, ""]
     interval: Float[Array, ""]
-    level: Float[Array, " k"]
+    drive: DriveState
     data: Float[Array, "k c"]
     noise: Float[Array, " c"]
     samples: int = eqx.field(static=True)
@@ -193,7 +192,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
             "compare flights with `jaxcam.recordings.compare`."
         )
     model = with_constants(model, run)
-    level = _levels(model, run)
+    drive = _drive(model, run)
     data = np.stack([run[name] for name in model.sensors], axis=-1)
     if not 2 <= samples < len(run):
         raise RecordingError(
@@ -205,7 +204,7 @@ def prepared(model: Model, recording: Recording | Segments, samples: int) -> Pre
         _first_state(model, data),
         jnp.asarray(float(run.time[0])),
         jnp.asarray(float(interval)),
-        level,
+        drive,
         jnp.asarray(data, dtype=float),
         jnp.stack([sensor.floor for sensor in model.sensors.values()]),
         samples,
@@ -254,32 +253,32 @@ def simulated(model: Model, one: Prepared) -> Simulated:
 
     def sample(carried, inputs):
         x, mode = carried
-        number, level = inputs
+        number, drive = inputs
         t = one.start + number * one.interval
-        none = jnp.zeros_like(t)
-        system = model.driven(t, DriveState(level, none, none))
+        system = model.driven(t, drive)
         if mode is not None:
-            still = jnp.zeros(one.steps)
-            drive = DriveState(jnp.full(one.steps, level), still, still)
-            found = switched_nodes(model, x, t, step, drive, 1, mode, _EVENTS)
+            middle = step * (jnp.arange(one.steps, dtype=float) + 0.5)
+            each = DriveState(*(part + 0.0 * middle for part in drive))
+            each = each._replace(angle=drive.angle + drive.rate * middle)
+            found = switched_nodes(model, x, t, step, each, 1, mode, _EVENTS)
             states, rates, mode, events = found
             return (states[-1], mode), seen(t, system, x, rates[0], events)
 
         def advance(x, k):
             at = t + k * step
-            return runge_kutta(model, lambda t: system, at, x, step)[0], None
+            return runge_kutta(model, model.during(t, drive), at, x, step)[0], None
 
         after, _ = jax.lax.scan(advance, x, jnp.arange(one.steps, dtype=float))
         field = augmented_field(model, system, t, x)
         return (after, None), seen(t, system, x, field)
 
-    numbers, mode = jnp.arange(one.level.shape[0], dtype=float), None
+    numbers, mode = jnp.arange(one.data.shape[0], dtype=float), None
     if isinstance(model.system, SwitchedSystem):
-        none = jnp.zeros_like(one.start)
-        system = model.driven(one.start, DriveState(one.level[0], none, none))
+        first = DriveState(*(part[0] for part in one.drive))
+        system = model.driven(one.start, first)
         known = surfaces_in(system, one.start, one.state[:size])
         mode = first_mode(known, system, one.start, one.state[:size], one.interval)
-    return jax.lax.scan(sample, (one.state, mode), (numbers, one.level))[1]
+    return jax.lax.scan(sample, (one.state, mode), (numbers, one.drive))[1]
 
 
 def _first_state(model: Model, data) -> Float[Array, " n"]:
@@ -343,18 +342,19 @@ def restarted(model: Model, one: Prepared) -> Prepared:
 
 def _first(one: Prepared) -> Prepared:
     """Return the part of the recording to which the initial state is fitted."""
-    return dataclasses.replace(
-        one, level=one.level[: one.samples], data=one.data[: one.samples]
-    )
+    drive = DriveState(*(part[: one.samples] for part in one.drive))
+    return dataclasses.replace(one, drive=drive, data=one.data[: one.samples])
 
 
-def _levels(model: Model, run: Recording) -> Float[Array, " k"]:
-    """Return the input at each sample; zero if the model has no input."""
+def _drive(model: Model, run: Recording) -> DriveState:
+    """Return the input at each sample, if any, and its slope after it."""
     spacing = np.diff(run.time)
     if np.ptp(spacing) > 2 * _UNEVEN * np.mean(spacing):
         raise RecordingError(
             f"{run.name}: its samples are not evenly spaced; resample it first."
         )
-    if not isinstance(model.drive, Input):
-        return jnp.zeros(len(run))
-    return jnp.asarray(run[model.drive.channel])
+    level, slope, none = np.zeros((3, len(run)))
+    if isinstance(model.drive, Input):
+        level = run[model.drive.channel]
+        slope = model.drive.slopes(run.time, level)
+    return DriveState(*map(jnp.asarray, (level, slope, none)))

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ._fit import fit
 from ._fit_result import Fit
-from .engine import free_columns, linearised, Problem, reduced
+from .engine import free_columns, linearised, Problem, sound_information
 
 
 # a combination is identifiable if the data reduce its error to this fraction of the
@@ -53,6 +53,9 @@ class Identifiability:
     """Standard error of each parameter from the data alone if no other is known, in
     units of the scale.
     """
+    lost: tuple[str, ...] = ()
+    """Recordings that are not counted, because their information is lost to rounding.
+    """
 
     @property
     def seen(self) -> int:
@@ -70,8 +73,14 @@ class Identifiability:
             f"The data determine {self.seen} of {total} combinations of parameters to "
             "within half their tolerance."
         ]
+        if self.lost:
+            found.append(
+                f"At the nominal parameters, the motion in {_listed(self.lost)} is so "
+                f"sensitive that rounding exceeds the information, so "
+                f"{'it is' if len(self.lost) == 1 else 'they are'} not counted here."
+            )
         dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]
-        if dead:
+        if dead and len(self.lost) == 0:
             found.append(
                 f"The data do not depend on {_listed(dead)} at all: fix "
                 f"{'it' if len(dead) == 1 else 'them'}."
@@ -159,7 +168,7 @@ def identify(
     columns = free_columns(problem, names)
     at = at or fit(problem, free=())
     blocks, _ = linearised(problem, columns, problem.extras, at.point)
-    information, _ = reduced(columns, blocks)
+    information, lost = sound_information(columns, blocks)
     if not np.all(np.isfinite(information)):
         raise ValueError(
             "The sensitivities of the model to its parameters are not finite; check "
@@ -188,6 +197,7 @@ def identify(
         columns.scale,
         alone,
         together,
+        tuple(problem.records[k] for k in lost),
     )
 
 

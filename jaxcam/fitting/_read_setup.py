@@ -17,7 +17,7 @@ from ..recordings.files import (
 from ._read_channels import channel_of, read_sensors
 from ._setup import Setup
 from ._stated import NUMBER, Stated, stated
-from .engine import Input, Model, Turning
+from .engine import Input, INTERPOLATIONS, Model, Turning
 from .own_systems import Field, stated_system, system_class
 
 
@@ -239,7 +239,10 @@ def _drive(
     if "input" in tables:
         section = Section(file, "input", tables)
         channel = channel_of(section, section.word("channel"))
-        field = section.word("field")
-        section.done()
-        return Input(channel, Field(field)), None, {field: 0.0}
+        field, between = section.word("field"), INTERPOLATIONS[0]
+        if "interpolation" in section.table:
+            between = section.choice("interpolation", *INTERPOLATIONS)
+        known = ("channel", "field", "interpolation")
+        known_keys(file, "input", section.table, known)
+        return Input(channel, Field(field), between), None, {field: 0.0}
     return None, None, {}

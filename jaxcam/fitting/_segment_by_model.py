@@ -22,6 +22,7 @@ from ..recordings.cut import (
 )
 from ._gap_rates import gap_rates
 from ._missed_impacts import Spans, with_missed_impacts
+from ._time_unit import refuse_slow_samples
 from .engine import (
     DriveState,
     Layout,
@@ -83,8 +84,8 @@ def segment_by_model(
         The segments of each recording.
 
     Raises:
-        RecordingError: A channel is missing, or a gap depends on a state that no
-            channel measures.
+        RecordingError: A channel is missing, a gap depends on a state that no channel
+            measures, or the samples are too far apart for the model to be followed.
 
     Examples:
         >>> from jaxcam import fitting, recordings
@@ -101,6 +102,9 @@ def segment_by_model(
     measured = tuple(measured_components(model).items())
     picks = {component: name for name, component in reversed(measured)}
     gaps = []
+    for recording in sorted(recordings, key=lambda one: -one.interval)[:1]:
+        usual = np.nanmedian(_states(model, picks, recording), axis=0)
+        refuse_slow_samples(with_constants(model, recording), recording, usual)
     for k, recording in enumerate(recordings):
         if progress is not None:
             progress(k / len(recordings))
@@ -255,9 +259,13 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
         for place in np.flatnonzero(row):
             if place in picks:
                 continue
-            name = f"`{names[place]}`" if names else f"component {place} of the state"
+            name, sees = f"component {place} of the state", ""
+            if names:
+                name = f"`{names[place]}`"
+                sees = f'`sees = "{names[place]}"` in the rig file, '
             raise RecordingError(
                 f"{recording.name}: gap {number + 1} depends on {name}, which no "
-                f"channel measures; add a sensor without a bandwidth whose `observe` "
-                f"is {place}."
+                f"channel measures, so impacts cannot be found; measure it, and add a "
+                f"channel for it without a bandwidth ({sees}`Sensor({place}, ...)` in "
+                f"Python)."
             )

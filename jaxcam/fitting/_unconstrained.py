@@ -34,14 +34,14 @@ class Unconstrained:
         if len(self.names) == 1:
             return (
                 f"The data do not constrain {self.names[0]}; fix it or give it a "
-                f"tolerance."
+                f"(smaller) tolerance."
             )
         moves = ", ".join(
             f"{name} by {share:+.3g}" for name, share in zip(self.names, self.shares)
         )
         return (
             f"A joint change of {moves} does not affect the data; fix one of them or "
-            f"give it a tolerance."
+            f"give it a (smaller) tolerance."
         )
 
 

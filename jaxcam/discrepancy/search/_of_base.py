@@ -28,7 +28,7 @@ class OfBase:
 def of_base(drive: Turning | Input | None) -> Turning | Input | None:
     """Return the drive of the base of a `WithTerms`."""
     if isinstance(drive, Input):
-        return Input(drive.channel, OfBase(drive.value))
+        return Input(drive.channel, OfBase(drive.value), drive.interpolation)
     if drive is not None:
         acceleration = drive.acceleration and OfBase(drive.acceleration)
         return Turning(OfBase(drive.speed), OfBase(drive.phase), acceleration)

@@ -11,6 +11,7 @@ from ._columns import (
     prior_cost as prior_cost,
     prior_information as prior_information,
     reduced as reduced,
+    sound_information as sound_information,
 )
 from ._damped_step import damped_step as damped_step
 from ._each_record import each_record as each_record, of_record as of_record
@@ -43,6 +44,7 @@ from ._model import (
     DriveState as DriveState,
     filtered_channels as filtered_channels,
     Input as Input,
+    INTERPOLATIONS as INTERPOLATIONS,
     measured_components as measured_components,
     Model as Model,
     primary_channel as primary_channel,

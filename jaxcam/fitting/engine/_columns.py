@@ -15,6 +15,11 @@ from ._problem import Problem
 from ._sharpness import shared_width
 
 
+# Information below minus this fraction of the largest of its recording is lost to
+# rounding
+_NEGATIVE = 1e-6
+
+
 @dataclasses.dataclass(frozen=True)
 class Columns:
     """The free values of a fit: one per free parameter, or one per parameter and
@@ -121,6 +126,24 @@ def linearised(
 def reduced(columns: Columns, blocks: Blocks):
     """Return the information and score of the free values, in units of their scales."""
     return gathered(columns, eliminate_states(blocks))
+
+
+def sound_information(columns: Columns, blocks: Blocks):
+    """Return the `reduced` information without the recordings in which it is lost to
+    rounding, and the indices of these recordings.
+
+    Information is never negative. It is found as a difference, which rounding makes
+    negative if a piece is so sensitive, for example where a motion just sticks, that
+    the difference is smaller than the rounding error of its terms.
+    """
+    found = eliminate_states(blocks)
+    each = np.array(found.information)
+    lost = np.zeros(len(each), dtype=bool)
+    if np.all(np.isfinite(each)):
+        values = np.linalg.eigvalsh(each)
+        lost = values[:, 0] < -_NEGATIVE * np.abs(values).max(axis=1)
+    each[lost] = 0.0
+    return gathered(columns, found._replace(information=each))[0], np.flatnonzero(lost)
 
 
 def held_firmer(columns: Columns, blocks: Blocks):

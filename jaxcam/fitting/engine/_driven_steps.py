@@ -9,7 +9,7 @@ from scipy.signal import savgol_coeffs
 
 from ...recordings import Segments
 from ...recordings.cut import Drive
-from ._model import DriveState, Numbers
+from ._model import DriveState, Input, Numbers
 
 
 # Times at which the steps of each piece of each recording begin and end
@@ -45,32 +45,33 @@ def mean_rates(segments: Sequence[Segments], edges: Edges):
     return mean
 
 
-def input_at(segments: Sequence[Segments], channel: str, times) -> DriveState:
-    """Return the input of each recording at `times`, in the same shape; each sample is
-    held until the next.
-    """
+def input_at(segments: Sequence[Segments], source: Input, times) -> DriveState:
+    """Return the input of each recording at `times`, in the same shape."""
     found = np.zeros(times.shape)
     for row, part in enumerate(segments):
-        time = part.recording.time
+        time, level = part.recording.time, part.recording[source.channel]
         last = np.searchsorted(time, times[row], side="right") - 1
-        found[row] = part.recording[channel][np.maximum(last, 0)]
+        last = np.maximum(last, 0)
+        slope = source.slopes(time, level)[last]
+        found[row] = level[last] + slope * np.maximum(times[row] - time[last], 0.0)
     return DriveState(found, np.zeros(times.shape), np.zeros(times.shape))
 
 
 def input_in_steps(
-    segments: Sequence[Segments], channel: str, edges: Edges
+    segments: Sequence[Segments], source: Input, edges: Edges
 ) -> DriveState:
     """Return the mean and the slope of each recording's input in every step, `(r, k,
     n)`.
 
     A linear input with this mean and slope has the same integral and first moment as
-    the held samples; otherwise, a jump within a step would cause an error of position.
+    the input; otherwise, a jump within a step would cause an error of position.
     """
     step = np.diff(edges)
     mean, slope = np.zeros(step.shape), np.zeros(step.shape)
     for row, part in enumerate(segments):
-        time, level = part.recording.time, part.recording[channel]
-        first, second = _integrals(time, level, edges[row])
+        time, level = part.recording.time, part.recording[source.channel]
+        slopes = source.slopes(time, level)
+        first, second = _integrals(time, level, slopes, edges[row])
         h = step[row]
         mean[row] = np.diff(first) / h
         # the moment about the middle of a step, integrated by parts
@@ -79,16 +80,21 @@ def input_in_steps(
     return DriveState(mean, slope, np.zeros(step.shape))
 
 
-def _integrals(time, level, at):
-    """Return the first and second integrals of held samples at the given times."""
+def _integrals(time, level, slope, at):
+    """Return the first and second integrals, at the given times, of an input with a
+    level at each sample and a slope after it.
+    """
     interval = np.diff(time)
-    first = np.concatenate([[0.0], np.cumsum(level[:-1] * interval)])
-    grown = first[:-1] * interval + level[:-1] * interval**2 / 2
+    once = level[:-1] * interval + slope[:-1] * interval**2 / 2
+    twice = level[:-1] * interval**2 / 2 + slope[:-1] * interval**3 / 6
+    first = np.concatenate([[0.0], np.cumsum(once)])
+    grown = first[:-1] * interval + twice
     second = np.concatenate([[0.0], np.cumsum(grown)])
     last = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     after = np.clip(at - time[last], 0.0, interval[last])
-    once = first[last] + level[last] * after
-    return once, second[last] + first[last] * after + level[last] * after**2 / 2
+    once = level[last] * after + slope[last] * after**2 / 2
+    twice = level[last] * after**2 / 2 + slope[last] * after**3 / 6
+    return first[last] + once, second[last] + first[last] * after + twice
 
 
 class DriveError(NamedTuple):

@@ -169,17 +169,23 @@ class Turning(eqx.Module):
         return eqx.tree_at(self.acceleration, system, jnp.asarray(drive.acceleration))
 
 
+# What an input does between two samples
+INTERPOLATIONS = "hold", "linear"
+
+
 class Input(eqx.Module):
     """A measured input, such as a force or a voltage, and the system field for it.
 
-    When a recording is predicted, the field follows the input in that recording. Each
-    sample is held until the next (zero-order hold), as in digital controllers. Within
-    each integration step, the input is linear, with the mean and the first moment of
-    the held samples.
+    When a recording is predicted, the field follows the input in that recording.
+    Between two samples, the input either keeps the value of the first one (`"hold"`, as
+    at the output of a digital controller) or is interpolated (`"linear"`, as suits a
+    continuous quantity such as the reading of a force transducer). If a continuous
+    input is held, it is late by half a sampling interval. Within each integration step,
+    the input is linear, with the mean and the first moment of this curve.
 
     Examples:
         >>> from jaxcam.fitting import Input
-        >>> Input("force_N", lambda s: s.force).channel
+        >>> Input("force_N", lambda s: s.force, "linear").channel
         'force_N'
     """
 
@@ -187,6 +193,21 @@ class Input(eqx.Module):
     """Channel of the recordings that contains the input."""
     value: Callable[[HybridSystem], Array] = eqx.field(static=True)
     """Selects the field of the system, such as `lambda s: s.force`."""
+    interpolation: str = eqx.field(static=True, default="hold")
+    """`"hold"` or `"linear"`: the input between two samples."""
+
+    def __check_init__(self):
+        if self.interpolation not in INTERPOLATIONS:
+            raise ValueError(
+                f"The `interpolation` of an input is {self.interpolation!r}; write "
+                f"{' or '.join(map(repr, INTERPOLATIONS))}."
+            )
+
+    def slopes(self, time, level) -> np.ndarray:
+        """Return the slope of the input after each sample; zero after the last."""
+        if self.interpolation == "hold":
+            return np.zeros(len(level))
+        return np.append(np.diff(level) / np.diff(time), 0.0)
 
     def at(self, system, t, drive: DriveState):
         """Return the system with its input at a given level."""

@@ -17,7 +17,7 @@ from ._driven_steps import (
     input_in_steps,
     mean_rates,
 )
-from ._model import DriveState, Numbers
+from ._model import DriveState, Input, Numbers
 from ._piece_length import bearable_length
 
 
@@ -182,7 +182,7 @@ def gather(
     segments: Sequence[Segments],
     channels: Sequence[str],
     steps: int,
-    measured: str | None = None,
+    measured: Input | None = None,
     curved: Sequence[str] | None = None,
     rests: bool = True,
     in_flight_only: Sequence[str] = (),
@@ -190,8 +190,8 @@ def gather(
     """Gather the pieces of all recordings, padded so that similar recordings share a
     compiled program.
 
-    **Arguments:** `measured` is the channel of an input, in place of a drive; `curved`
-    and `rests` are those of `spans`; the samples of the channels `in_flight_only` are
+    **Arguments:** `measured` is an input, in place of a drive; `curved` and `rests` are
+    those of `spans`; the samples of the channels `in_flight_only` are
     not used in contact.
 
     **Raises:** `RecordingError` if there is nothing to fit.

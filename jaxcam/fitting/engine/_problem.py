@@ -177,7 +177,7 @@ class Problem:
         for column, one in enumerate(parameters):
             if one.known is not None:
                 values[:, column] = one.known
-        measured = model.drive.channel if isinstance(model.drive, Input) else None
+        measured = model.drive if isinstance(model.drive, Input) else None
         steps = _STEPS
         # filtered channels are smooth even where the motion is not, and outputs are
         # noisy, so they do not show how short the pieces must be

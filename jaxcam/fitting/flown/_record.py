@@ -23,9 +23,9 @@ class Record(eqx.Module):
     """Samples `(k, c)` of the channels that show a component of the state, unfiltered.
 
     The arrays are padded, so that recordings of similar lengths share a program.
-    `drive` holds the motion of the drive, or the level of the input, in the step after
-    each sample. `guess` is the state estimated from the samples around each of them,
-    `(k, n)`.
+    `drive` holds the motion of the drive, or mean and slope of the input, in the step
+    after each sample. `guess` is the state estimated from the samples around each of
+    them, `(k, n)`.
     """
 
     begin: Float[Array, ""]
@@ -84,11 +84,13 @@ def _drive(
     model: Model, recording: Recording, drive: Drive | None
 ) -> Sequence[np.ndarray]:
     """Return angle, rate and acceleration of the drive in the step after each sample,
-    or the level of the input, held there.
+    or mean and slope of the input.
     """
     none = np.zeros(len(recording))
     if isinstance(model.drive, Input):
-        return recording[model.drive.channel], none, none
+        level = recording[model.drive.channel]
+        slope = model.drive.slopes(recording.time, level)
+        return level + slope * recording.interval / 2, slope, none
     if drive is None:
         return none, none + 1.0, none
     columns = drive.angle, drive.rate, drive.acceleration.values

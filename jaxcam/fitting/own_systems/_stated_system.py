@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from ...hybrid import HybridSystem
+from ...hybrid import HybridSystem, SwitchedSystem
 from ...hybrid.checks import NEEDS_VALUES, needs_values
 from ...parameters import as_arrays, parameter_names
 from ...recordings import RigError
@@ -137,27 +137,66 @@ def _refuse_broken(file: Path, system: HybridSystem) -> None:
         raise RigError(
             f"{file}: `check` of {name} fails ({fault(error)}); correct it."
         ) from error
-    found = {}
-    for function in ("vector_field", "gap", "impact"):
-        at = jnp.zeros(()), jnp.zeros(count)
-        try:
-            found[function] = jax.eval_shape(getattr(system, function), *at).shape
-        except NEEDS_VALUES as error:
-            said = needs_values(f"`{function}` of {name}")
-            raise RigError(f"{file}: {said}.") from error
-        except Exception as error:
-            raise RigError(
-                f"{file}: `{function}` of {name} fails ({fault(error)}); correct it."
-            ) from error
-    gaps = found["gap"]
-    wanted = {
-        "vector_field": (count,),
-        "gap": gaps if len(gaps) < 2 else (),
-        "impact": (*gaps, count),
-    }
-    for function, shape in wanted.items():
-        if found[function] != shape:
-            raise RigError(
-                f"{file}: `{function}` of {name} has the shape {found[function]}, but "
-                f"{shape} is required for its {count} state names; correct it."
-            )
+    try:
+        _ = system.period
+    except Exception as error:
+        raise _failing(file, f"`period` of {name}", error) from error
+    at = jnp.zeros(()), jnp.zeros(count)
+    # before `vector_field`, which calls `branch`
+    if isinstance(system, SwitchedSystem):
+        sides = jnp.ones(_shape(file, system, "switching", *at) or (1,))
+        branch = _shape(file, system, "branch", *at, sides)
+        _demand(file, system, "branch", branch, (count,))
+    field = _shape(file, system, "vector_field", *at)
+    gaps = _shape(file, system, "gap", *at)
+    after = _shape(file, system, "impact", *at)
+    _demand(file, system, "vector_field", field, (count,))
+    _demand(file, system, "gap", gaps, gaps if len(gaps) < 2 else ())
+    _demand(file, system, "impact", after, (*gaps, count))
+    constraints, many = len(system.constraint_names), gaps[0] if gaps else 1
+    if constraints not in (0, many):
+        raise RigError(
+            f"{file}: {name} has {constraints} `constraint_names`, but {_gaps(many)}; "
+            f"give one name for each gap."
+        )
+
+
+def _demand(file: Path, system: HybridSystem, function: str, found, wanted) -> None:
+    """Raise `RigError` if a function returns an array of the wrong shape."""
+    if found != wanted:
+        count = len(system.state_names)
+        gaps = f" and {_gaps(wanted[0])}" if len(wanted) > 1 else ""
+        raise RigError(
+            f"{file}: `{function}` of {type(system).__name__} has the shape {found}, "
+            f"but {wanted} is required for its {count} state names{gaps}; correct it."
+        )
+
+
+def _gaps(count: int) -> str:
+    return f"{count} gap{'s' * (count != 1)}"
+
+
+def _shape(file: Path, system: HybridSystem, function: str, *at) -> tuple[int, ...]:
+    """Return the shape of the array that a function of the system returns.
+
+    **Raises:** `RigError` if the function fails, or returns something else.
+    """
+    name = f"`{function}` of {type(system).__name__}"
+    try:
+        found = jax.eval_shape(getattr(system, function), *at)
+    except NEEDS_VALUES as error:
+        raise RigError(f"{file}: {needs_values(name)}.") from error
+    except Exception as error:
+        raise _failing(file, name, error) from error
+    if found is None:
+        raise RigError(f"{file}: {name} returns nothing; end it with `return`.")
+    if not isinstance(found, jax.ShapeDtypeStruct):
+        raise RigError(
+            f"{file}: {name} returns a {type(found).__name__}; return an array, such "
+            f"as `jnp.stack([...])`."
+        )
+    return found.shape
+
+
+def _failing(file: Path, what: str, error: Exception) -> RigError:
+    return RigError(f"{file}: {what} fails ({fault(error)}); correct it.")
