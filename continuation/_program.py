@@ -261,21 +261,17 @@ def _on_host(
     width = np.asarray(context.width)
     scale = np.asarray(_scales(problem, leaf, guess, width))
 
-    start = guess / scale
-
-    def evaluate(y):
-        return first if y is start else problem.evaluated_on_host(leaf, y * scale)
-
     def equations(y, found):
         return _augmented(y, guess, scale, normal, found, least_norm, np)
 
     solved = newton_on_host(
-        evaluate,
+        lambda y: problem.evaluated_on_host(leaf, y * scale),
         equations,
-        start,
+        guess / scale,
         settings.tolerance,
         settings.max_iterations,
         bool(given),
+        first,
     )
     z = guess if given else solved.y * scale
     success, count = np.asarray(solved.success or given), np.asarray(solved.iterations)

@@ -170,6 +170,30 @@ def test_other_functions_err_by_little(name):
     assert np.max(np.abs(mine[:, 0] - exact) / np.spacing(np.abs(exact))) <= 2.0
 
 
+@pytest.mark.parametrize("name", ["exp", "exp2", "log"])
+def test_functions_of_32_bit_floats_err_by_one_ulp(name):
+    """Also at the edges: zeros, infinities, NaN, denormal numbers, and overflow."""
+    rng = np.random.default_rng(6)
+    exponents = rng.uniform(-85, 87, 3000)
+    numbers = np.exp(exponents) if name == "log" else exponents
+    near = np.concatenate([rng.uniform(0.5, 2.0, 3000), 1 + rng.normal(0, 1e-5, 300)])
+    x = np.concatenate([numbers, near]).astype(np.float32).astype(float)
+
+    def function(v):
+        return getattr(jnp, name)(v.astype(jnp.float32)).astype(jnp.float64)
+
+    mine, _ = both(function, x[:, None])
+    exact = _true(name, x)
+    sizes = np.spacing(np.abs(exact).astype(np.float32)).astype(float)
+    assert np.max(np.abs(mine[:, 0] - exact) / sizes) <= 1.0
+    edges = [0.0, -0.0, -1.0, np.inf, -np.inf, np.nan, 1e30, -1e30, 128.0, -150.5]
+    edges = [*edges, 1e-40, -149.0]
+    mine, _ = both(function, np.array(edges)[:, None])
+    with np.errstate(all="ignore"):
+        exact = getattr(np, name)(np.array(edges, np.float32)).astype(float)
+    np.testing.assert_allclose(mine[:, 0], exact, rtol=2e-7, atol=0.0)
+
+
 _EDGES = [*_SPECIAL, 709.7, 709.9, -745.0, -746.0, -750.5, 1024.5, 0.999, -0.999, 1.001]
 
 

@@ -9,13 +9,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxcam.hybrid import flow
 from jaxcam.hybrid.flow_jacobian import flow_jacobian, runs_by_llvm
 from jaxcam.hybrid.programs import program
 
 from .._evaluation import Evaluation
 from .._parameter import with_leaf
 from ._event_changes import values_of_events
+from ._states_at_periods import states_outside_programs
 
 
 def evaluated_by_llvm(problem: Any, leaf: int, z) -> Evaluation | None:
@@ -24,28 +24,30 @@ def evaluated_by_llvm(problem: Any, leaf: int, z) -> Evaluation | None:
     """
 
     def evaluate() -> Evaluation:
-        arrival, matrix = flow_jacobian(_turn, (problem, leaf), z, problem.settings)
-        states = _stroboscopic(problem, leaf, z) if problem.periods else None
+        arrival, matrix = flow_jacobian(_period, (problem, leaf), z, problem.settings)
+        states = _states(problem, leaf, z, int(arrival.code) == 0)
         found = _evaluation(problem, leaf, jnp.asarray(z), arrival, matrix, states)
         return jax.tree.map(np.asarray, found)
 
     return runs_by_llvm(problem.settings, (problem, z), evaluate)
 
 
-def _turn(given, z):
+def _period(given, z):
     problem, leaf = given
     u, system = z[:-1], with_leaf(problem.parameters, leaf, z[-1])
     return system, problem.state(u), *problem.times(u, system)
 
 
-def _stroboscopic(problem, leaf: int, z):
-    """Return the states at the forcing periods, `(periods, n)`."""
-    system, x, start, end = _turn((problem, leaf), jnp.asarray(z))
-    states, step = [x], (end - start) / problem.periods
-    for k in range(problem.periods - 1):
-        times = start + k * step, start + (k + 1) * step
-        states.append(flow(system, states[-1], *times, settings=problem.settings).state)
-    return jnp.stack(states)
+def _states(problem, leaf: int, z, successful: bool):
+    """Return the states at the forcing periods, `(periods, n)`; None without forcing,
+    and NaN if the motion failed.
+    """
+    if not problem.periods:
+        return None
+    system, x, start, end = _period((problem, leaf), jnp.asarray(z))
+    if not successful:
+        return np.full((problem.periods, len(x)), np.nan)
+    return states_outside_programs(problem, x, float(start), float(end), system)
 
 
 @program

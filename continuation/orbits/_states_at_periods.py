@@ -1,12 +1,18 @@
-"""Compute the states of an orbit at integer multiples of the forcing period."""
+"""Compute the states of an orbit at integer multiples of the forcing period.
+
+Each of them is computed from the start, because a state alone does not tell on which
+side of a surface with hysteresis the motion is.
+"""
 
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow
+from jaxcam.hybrid.flow_jacobian import unchecked_flow
 
 
 def states_at_periods(
@@ -22,3 +28,15 @@ def states_at_periods(
         return flow(parameters, x, start, until, settings=problem.settings).state
 
     return jnp.concatenate([x[None], jax.vmap(later)(parts)])
+
+
+def states_outside_programs(
+    problem: Any, x, start, end, parameters
+) -> Float[np.ndarray, "periods n"]:
+    """Return the same as `states_at_periods`, one simulation at a time."""
+    states = [np.asarray(x)]
+    for k in range(1, problem.periods):
+        until = start + k / problem.periods * (end - start)
+        made = unchecked_flow(parameters, x, start, until, problem.settings)
+        states.append(np.asarray(made.state))
+    return np.stack(states)

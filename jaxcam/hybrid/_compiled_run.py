@@ -21,6 +21,8 @@ def _start(case, _=None):
     return plan, jax.tree.map(jnp.asarray, carried)
 
 
+# number of attempted steps between two reports of the progress
+CHUNK = 2048
 _STARTED = Rowwise(_start, width=1)
 _LOOPS = Cache()
 
@@ -69,7 +71,7 @@ def run_compiled(
     case: tuple,
     budget: int,
     progress: Callable[[float], None] | None = None,
-    chunk: int = 2048,
+    chunk: int = CHUNK,
 ) -> CompiledRun:
     """Return a run that is not traced.
 

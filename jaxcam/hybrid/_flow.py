@@ -16,12 +16,12 @@ from ._prepared import prepared
 from ._settings import Settings
 from ._system import HybridSystem
 from ._types import RealScalar
-from .backend import Lacking, say_lacking
+from .backend import runs_by_llvm
 from .checks import check_system
 from .codes import RUNNING
 from .loop import first_state, Functions, iteration, LoopState, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
-from .programs import is_outermost, is_traced, is_tracing
+from .programs import is_traced, is_tracing
 
 
 # number of iterations between two checks of whether a batch element is still running
@@ -63,7 +63,7 @@ def flow(
     differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
     parameters. A gradient costs one forward derivative per differentiation variable.
     Outside of transformations, the loop is compiled by LLVM, like that of
-    [`jaxcam.simulate`][].
+    [`jaxcam.simulate`][], and no step is repeated to end exactly at a release.
     The numbers of impacts, contacts and releases may differ between batch elements. If
     the start is invalid (a negative gap, a state that is not finite, or t1 < t0),
     `code` gives the reason and the final state is NaN. Outside of transformations, the
@@ -98,14 +98,22 @@ def flow(
             settings.check()
         if not is_traced((system, state, t0)):
             check_system(system, jnp.asarray(t0, jnp.float64), state, settings)
+    return unchecked_flow(system, state, t0, t1, settings, max_steps)
+
+
+def unchecked_flow(
+    system, state, t0, t1, settings: Settings, max_steps: int = 4096
+) -> Arrival:
+    """Return the same as `flow`, without its checks; for solvers, whose iterates may be
+    invalid.
+    """
     t0, t1 = jnp.asarray(t0, jnp.float64), jnp.asarray(t1, jnp.float64)
-    if settings.compiles and is_outermost():
-        try:
-            return _by_llvm(system, settings, state, t0, t1, max_steps)
-        except Lacking as lacking:
-            say_lacking(lacking, settings.demands)
+    case = system, settings, state, t0, t1
+    made = runs_by_llvm(settings, case, lambda: _by_llvm(*case, max_steps))
+    if made is not None:
+        return made
     run = _flow if settings.plain else whole(_flow)
-    return run(system, settings, state, t0, t1, max_steps)
+    return run(*case, max_steps)
 
 
 def _by_llvm(system, settings, state, t0, t1, max_steps: int) -> Arrival:

@@ -9,17 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
 
-from ._compiled_run import run_compiled
+from ._compiled_run import CHUNK, run_compiled
 from ._prepared import prepared
 from ._started import started
 from .backend import Lacking, say_lacking
 from .codes import RUNNING
 from .loop import Log, LoopState, run
-
-
-# number of attempted steps in a chunk; between chunks, progress is reported and a run
-# can be interrupted
-_CHUNK = 2048
 
 
 def run_untraced(
@@ -50,7 +45,7 @@ def _said(progress, t, t0, t1) -> None:
 
 def _by_llvm(system, settings, t0, state, t1, budget, progress):
     case = prepared(system), settings, t0, state, t1
-    made = run_compiled(case, budget, lambda t: _said(progress, t, t0, t1), _CHUNK)
+    made = run_compiled(case, budget, lambda t: _said(progress, t, t0, t1))
     _said(progress, t1, t0, t1)
     return made.log, made.mode, jnp.asarray(made.end.status, jnp.int32)
 
@@ -71,7 +66,7 @@ def _go_on(system, settings, t0, state, t1, carried: LoopState, rows):
 
 def _by_xla(system, settings, t0, state, t1, budget, progress):
     case = system, settings, t0, state, t1
-    size = min(_CHUNK, budget)
+    size = min(CHUNK, budget)
     carried, log, mode = _begin(*case, size)
     logs, used = [log], size
     while float(carried.status) == RUNNING and used < budget:

@@ -1,12 +1,12 @@
 """Compute the flow map and its Jacobian in one loop compiled by LLVM.
 
 The loop carries, for each variable, the derivative of the loop state, and multiplies it
-by the derivative of each attempted step (forward mode). It takes a small fraction of
-the time to compile that XLA needs for the same derivatives.
+by the derivative of each attempted step (forward mode). With few variables, it takes a
+small fraction of the time to compile that XLA needs for the same derivatives.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..parameters import as_arrays
-from ._flow import Arrival, arrival_of
+from ._flow import Arrival, arrival_of, unchecked_flow as unchecked_flow
 from ._settings import Settings
 from ._started import started
 from .backend import (
@@ -25,15 +25,16 @@ from .backend import (
     Lacking,
     laid_out,
     Rowwise,
-    say_lacking,
+    runs_by_llvm as runs_by_llvm,
 )
 from .caches import Cache
 from .dependence import dependent
 from .loop import Functions, iteration, LoopState, Plan
-from .programs import is_outermost, is_traced
 
 
-T = TypeVar("T")
+# maximum number of numbers in the state of the loop, with all derivatives: the code
+# grows with it, and XLA compiles larger programs faster
+_MOST = 640
 
 
 class Moving(NamedTuple):
@@ -147,6 +148,9 @@ def _start(case, _=None) -> _Started:
         return jax.tree.leaves(eqx.filter(begun(y)[0], eqx.is_array))
 
     closed, leaves = jax.make_jaxpr(arrays, return_shape=True)(y)
+    varying_leaves = [a for a, v in zip(leaves, dependent(closed), strict=True) if v]
+    if not all(jnp.issubdtype(a.dtype, jnp.inexact) for a in varying_leaves):
+        raise Lacking("derivatives of integers")
     shapes = tuple(
         leaf.shape if varies else None
         for leaf, varies in zip(leaves, dependent(closed), strict=True)
@@ -170,6 +174,9 @@ def _start(case, _=None) -> _Started:
     )
     system, plan = both
     first = JacobianState(carried, moving, numbers, rates)
+    number = len(jax.tree.leaves(first))
+    if number > _MOST:
+        raise Lacking(f"derivatives of {number} numbers of a state and a system")
     return _Started(system, plan, first, shapes)
 
 
@@ -200,23 +207,6 @@ class _Loop(NamedTuple):
 
 def _row(record, lane: JacobianState):
     return lane.steps - 1.0, [record.kind]
-
-
-def runs_by_llvm(settings: Settings, values: Any, run: Callable[[], T]) -> T | None:
-    """Return the result of `run`, which needs the LLVM backend; None if the settings or
-    a transformation exclude it, or if it lacks an operation.
-
-    **Arguments:** `values` are the numbers on which `run` depends.
-
-    **Raises:** `ValueError` if the settings demand LLVM and it lacks an operation.
-    """
-    if not settings.compiles or not is_outermost() or is_traced(values):
-        return None
-    try:
-        return run()
-    except Lacking as lacking:
-        say_lacking(lacking, settings.demands)
-        return None
 
 
 def _begun(case) -> tuple[_Loop, np.ndarray, np.ndarray]:

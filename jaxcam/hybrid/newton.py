@@ -73,14 +73,22 @@ def newton_at_once(
 
 
 def newton_on_host(
-    evaluate: Callable, equations: Callable, y, tolerance, iterations: int, given: bool
+    evaluate: Callable,
+    equations: Callable,
+    y,
+    tolerance,
+    iterations: int,
+    given: bool,
+    first: Any = None,
 ) -> Solved:
     """Return the same as `newton_at_once`, for functions that are called from Python
-    and return NumPy arrays.
+    and return NumPy arrays. Nothing is evaluated where an unknown is not finite.
+
+    **Arguments:** `first`: the results of the evaluation at y, if they are known.
     """
     y, success, count = np.asarray(y), False, 0
     tolerance = float(tolerance)
-    found = evaluate(y)
+    found = evaluate(y) if first is None else first
     while not given and count < iterations:
         value, matrix = equations(y, found)
         try:
@@ -88,12 +96,14 @@ def newton_on_host(
         except np.linalg.LinAlgError:
             step = np.full_like(y, np.nan)
         y, count = y - step, count + 1
+        if not np.all(np.isfinite(y)):
+            break
         found = evaluate(y)
         small = np.max(np.abs(step) / (tolerance * (1.0 + np.abs(y)))) < 1
         success = bool(small and np.max(np.abs(value)) < tolerance)
-        if success or not np.all(np.isfinite(step)):
+        if success:
             break
-    return Solved(y, success and bool(np.all(np.isfinite(y))), count, found)
+    return Solved(y, success, count, found)
 
 
 def _correction(matrix, value, xp=jnp):

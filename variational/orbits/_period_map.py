@@ -76,7 +76,7 @@ def derivatives_by_flow(system, values, where, state, t0, length, settings: Sett
     return derivatives
 
 
-def _turn(given, y):
+def _motion(given, y):
     """Return the system and the motion over a period that belong to the variables."""
     system, where, n = given
     x, start, length, values = y[:n], y[n], y[n + 1], y[n + 2 :]
@@ -88,9 +88,10 @@ def _by_llvm(system, values, where, state, t0, length, settings):
     n = len(state)
     y = np.concatenate([np.asarray(part).ravel() for part in (state, t0, length)])
     y = np.append(y, np.asarray(values))
-    arrival, whole = flow_jacobian(_turn, (system, where, n), y, settings)
+    arrival, whole = flow_jacobian(_motion, (system, where, n), y, settings)
     parts = whole[:, :n], whole[:, n], whole[:, n + 1], whole[:, n + 2 :]
-    return arrival.state, parts
+    end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
+    return end, parts
 
 
 def _fixed_by_llvm(system, guess, t0, length, settings, normal, sizes, free: bool):

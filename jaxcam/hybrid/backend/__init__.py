@@ -13,6 +13,7 @@ from ._attempts import (
     key_of as key_of,
     say_lacking as say_lacking,
 )
+from ._choice import runs_by_llvm as runs_by_llvm
 from ._cuda import cuda_attempts_of as cuda_attempts_of
 from ._layout import laid_out as laid_out, Layout as Layout
 from ._machine import user_cache as user_cache, vector_width as vector_width

@@ -3,10 +3,10 @@
 In a planar system, time alone determines the state during contact. If the forcing is
 periodic, a contact that begins within an earlier contact, shifted by whole periods,
 therefore ends at the shifted release of that contact, in the same state. A release is
-used once a second contact has ended in the same way, which also guards against a
-`period` that is not one; and only for contacts that begin no farther from it than twice
-as far as the earlier ones, because a body may rest on one of several surfaces that
-differ by a turn.
+used once a second contact has ended in the same way: a `period` that is wrong by more
+than 1e-8 thus skips nothing. A contact whose state is far from that of the release,
+compared with the known contact, is not skipped either, because a constraint may have
+several surfaces.
 """
 
 from typing import Any, NamedTuple
@@ -47,7 +47,7 @@ class Release(NamedTuple):
     confirmed: Any
 
 
-class LearningState(NamedTuple):
+class ReleaseState(NamedTuple):
     """The loop state, and the release of the last contact."""
 
     state: LoopState
@@ -78,7 +78,7 @@ class LearningState(NamedTuple):
         return self.state.chatters
 
 
-def learns(start: LaneStart) -> bool:
+def may_skip(start: LaneStart) -> bool:
     """Return whether the contacts of these batch elements can be skipped."""
     _, plan = start.static
     example = start.slots.rows
@@ -88,7 +88,7 @@ def learns(start: LaneStart) -> bool:
 
 
 def with_releases(start: LaneStart) -> LaneStart:
-    """Return the batch elements in `LearningState`s that know no release."""
+    """Return the batch elements in `ReleaseState`s that know no release."""
     state, kinds = start.slots
     count = len(jax.tree.leaves(state))
     number = np.dtype(float)
@@ -97,22 +97,22 @@ def with_releases(start: LaneStart) -> LaneStart:
     values, structure = jax.tree.flatten(nothing)
     rows = jax.tree.unflatten(structure, range(count, count + len(values)))
     more = np.tile(np.array(values)[:, None], start.numbers.shape[1])
-    slots = LaneLayout(LearningState(state, rows), (*kinds, *[number] * len(values)))
+    slots = LaneLayout(ReleaseState(state, rows), (*kinds, *[number] * len(values)))
     return start._replace(slots=slots, numbers=np.concatenate([start.numbers, more]))
 
 
-def iteration_past_contacts(functions: Functions, plan: Plan, carried: LearningState):
+def iteration_past_contacts(functions: Functions, plan: Plan, carried: ReleaseState):
     """Take one attempted step; a contact whose release is known ends at once."""
     state, record = iteration(functions, plan, carried.state)
-    release = _learnt(plan, carried.release, state, record)
+    release = _updated(plan, carried.release, state, record)
     (holds,) = state.contact
     state = functions.where(
         holds & (release.confirmed > 0), lambda: _skipped(plan, state, release), state
     )
-    return LearningState(state, release), record
+    return ReleaseState(state, release), record
 
 
-def _learnt(plan: Plan, known: Release, state: LoopState, record) -> Release:
+def _updated(plan: Plan, known: Release, state: LoopState, record) -> Release:
     """Return the release after an attempt, which may have ended a contact."""
     begins = record.kind == float(RowKind.CONTACT)
     ends = record.kind == float(RowKind.RELEASE)

@@ -18,7 +18,7 @@ from ..backend import (
 from ..codes import FINISHED, RUNNING
 from ..loop import iteration
 from ..lowering import pack
-from ._known_release import iteration_past_contacts, learns, with_releases
+from ._known_release import iteration_past_contacts, may_skip, with_releases
 from ._layout import compiled_chunk, Horizon, Lanes, LaneStart, start_lanes
 from ._table import Table
 
@@ -50,7 +50,7 @@ def run_refilled(
     start = start_lanes(lanes, horizon, settings, chunking.width)
     if settings.compiles:
         step, compiled_start = iteration, start
-        if learns(start):
+        if may_skip(start):
             step, compiled_start = iteration_past_contacts, with_releases(start)
         try:
             return run_compiled(

@@ -1,4 +1,4 @@
-"""Update the loop state after an attempted step, and choose the next step."""
+"""Update the loop state after an attempted step."""
 
 from typing import Any, NamedTuple
 

@@ -55,6 +55,7 @@ def may_rest(plan, impact: Impact, jets, hides):
     approach = jnp.where(impact.approach < 0, -impact.approach, 1.0)
     # 1 - r, times the speed of approach
     lost = _MARGIN * (approach - impact.rebound)
+    hides = hides | (impact.approach >= 0)
     lost = jnp.where(hides | (lost > 2 * approach), 2 * approach, lost)
     small = impact.rebound * jnp.abs(j) * approach <= plan.smallness * a * a * lost
     return (a < 0) & small & ~impact.several
