@@ -133,7 +133,10 @@ def _ended(gravity: float, ratio: float):
     """A fit with one parameter (9.81 +- 0.02) and one channel."""
     parameter = SimpleNamespace(tolerance=0.02, nominal=9.81)
     problem = SimpleNamespace(
-        parameter=lambda name: parameter, samples=9, records=("a", "b")
+        parameter=lambda name: parameter,
+        samples=9,
+        records=("a", "b"),
+        model=SimpleNamespace(drive=None),
     )
     estimate = Estimate("gravity", gravity, 0.001, "m/s^2")
     after = SimpleNamespace(estimates=[estimate])
