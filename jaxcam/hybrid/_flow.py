@@ -21,7 +21,7 @@ from .checks import check_system
 from .codes import RUNNING
 from .loop import first_state, Functions, iteration, LoopState, Plan
 from .lowering import depend_on, one_kernel, whole, with_kept
-from .programs import is_traced, is_tracing
+from .programs import is_outermost, is_traced, is_tracing, program
 
 
 # number of iterations between two checks of whether a batch element is still running
@@ -112,14 +112,22 @@ def unchecked_flow(
     made = runs_by_llvm(settings, case, lambda: _by_llvm(*case, max_steps))
     if made is not None:
         return made
-    run = _flow if settings.plain else whole(_flow)
-    return run(*case, max_steps)
+    return (_by_xla if is_outermost() else _traced)(*case, max_steps)
 
 
 def _by_llvm(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     case = prepared(system), settings, t0, state, t1
     made = run_compiled(case, max_steps)
     return arrival_of(made.end, np.asarray(made.log.kind), made.mode)
+
+
+def _traced(system, settings, state, t0, t1, max_steps: int) -> Arrival:
+    run = _flow if settings.plain else whole(_flow)
+    return run(system, settings, state, t0, t1, max_steps)
+
+
+# outside of transformations, one trace serves all runs of this kind
+_by_xla = program(_traced)
 
 
 def arrival_of(end: LoopState, kinds, mode) -> Arrival:
