@@ -63,7 +63,7 @@ def flow(
     differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
     parameters. A gradient costs one forward derivative per differentiation variable.
     Outside of transformations, the loop is compiled by LLVM, like that of
-    [`jaxcam.simulate`][], and no step is repeated to end exactly at a release.
+    [`jaxcam.hybrid.simulate`][], and no step is repeated to end exactly at a release.
     The numbers of impacts, contacts and releases may differ between batch elements. If
     the start is invalid (a negative gap, a state that is not finite, or t1 < t0),
     `code` gives the reason and the final state is NaN. Outside of transformations, the
