@@ -11,9 +11,6 @@ jaxcam is not included.
 
 import argparse
 import json
-import os
-import subprocess
-import sys
 import tempfile
 import time
 
@@ -22,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxcam
+from benchmarks._own_process import in_own_process
 from jaxcam import models
 from jaxcam.hybrid import HybridSystem, Settings
 
@@ -74,19 +72,6 @@ def measured(name: str, backend: str) -> tuple[float, float]:
     return simulated - begun, time.process_time() - simulated
 
 
-def in_process(name: str, backend: str, folder: str) -> tuple[float, float]:
-    """The same in a process of its own, which keeps its programs in a folder."""
-    more = {
-        "JAX_COMPILATION_CACHE_DIR": folder,
-        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
-    }
-    command = [sys.executable, "-m", "benchmarks.first_call", "--one", name, backend]
-    done = subprocess.run(
-        command, env=os.environ | more, capture_output=True, text=True, check=True
-    )
-    return tuple(json.loads(done.stdout.splitlines()[-1]))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--one", nargs=2, metavar=("SYSTEM", "BACKEND"))
@@ -99,7 +84,8 @@ def main() -> None:
     for name in SYSTEMS:
         for backend in ("xla", "auto"):
             with tempfile.TemporaryDirectory() as folder:
-                times = [in_process(name, backend, folder) for _ in range(2)]
+                case = [name, backend]
+                times = [in_own_process("first_call", case, folder) for _ in (1, 2)]
             cold, warm = (f"{a:.2f}, {b:.2f}" for a, b in times)
             print(f"| {name} | {backend} | {cold} | {warm} |", flush=True)
 

@@ -11,9 +11,6 @@ the first `branch`. Importing jax and jaxcam is not included.
 
 import argparse
 import json
-import os
-import subprocess
-import sys
 import tempfile
 import time
 
@@ -21,6 +18,7 @@ import jax.numpy as jnp
 
 import continuation
 import jaxcam
+from benchmarks._own_process import in_own_process
 from jaxcam.hybrid import Settings, SwitchedSystem
 from jaxcam.models import BeltOscillator
 
@@ -57,7 +55,7 @@ BELT = BeltOscillator(
 # system, parameter of the branch, and its bounds
 BRANCHES = {
     "BeltOscillator": (BELT, "belt", (1.0, 1.35)),
-    "the same with a stop": (BeltWithStop(), "stop", (1.9, 2.15)),
+    "belt and rigid stop": (BeltWithStop(), "stop", (1.9, 2.15)),
 }
 
 
@@ -74,17 +72,6 @@ def measured(name: str, backend: str) -> tuple[float, float]:
     return found - begun, time.process_time() - found
 
 
-def in_process(name: str, backend: str) -> tuple[float, float]:
-    """The same in a process of its own, without programs from others."""
-    command = [sys.executable, "-m", "benchmarks.first_orbit", "--one", name, backend]
-    with tempfile.TemporaryDirectory() as folder:
-        more = {"JAX_COMPILATION_CACHE_DIR": folder}
-        done = subprocess.run(
-            command, env=os.environ | more, capture_output=True, text=True, check=True
-        )
-    return tuple(json.loads(done.stdout.splitlines()[-1]))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--one", nargs=2, metavar=("SYSTEM", "BACKEND"))
@@ -96,7 +83,9 @@ def main() -> None:
     print("| --- | --- | --- | --- |")
     for name in BRANCHES:
         for backend in ("xla", "auto"):
-            orbit, branch = in_process(name, backend)
+            with tempfile.TemporaryDirectory() as folder:
+                case = [name, backend]
+                orbit, branch = in_own_process("first_orbit", case, folder)
             print(f"| {name} | {backend} | {orbit:.1f} | {branch:.1f} |", flush=True)
 
 

@@ -7,6 +7,8 @@ of initial states. Times are minimum CPU times of interleaved runs on one pinned
 at a tolerance of 1e-9.
 """
 
+import dataclasses
+
 from benchmarks import _timing
 
 
@@ -72,6 +74,13 @@ def main(side: int = 48, turns: int = 60, repeats: int = 3) -> None:
         f"core {CORE}"
     )
     print(_timing.table(rows))
+    by_xla = dataclasses.replace(SETTINGS, backend="xla")
+    other = stroboscope(system, start, turns, settings=by_xla, block=128)
+    apart = np.abs(made.states - other.states)
+    print(
+        f"LLVM against XLA: first 5 periods {apart[:, :5].max():.0e}, "
+        f"all periods {apart.max():.0e}"
+    )
     error = np.abs(made.states - samples)[:, :5].max(axis=(1, 2))
     print(
         f"first 5 turns: median {np.median(error):.1e}, 90 % "

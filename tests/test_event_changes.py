@@ -7,19 +7,15 @@ import pytest
 
 import continuation
 import jaxcam
+from benchmarks.first_orbit import BELT, BeltWithStop
 from continuation._parameter import pick_one
 from continuation.orbits._event_changes import events_of, name_of_change
 from jaxcam.filippov.modes import surface_rates
 from jaxcam.hybrid import flow, Settings, SwitchedSystem
-from jaxcam.models import BeltOscillator, BouncingBall
+from jaxcam.models import BouncingBall
 from jaxcam.parameters import as_arrays
 from jaxcam.thesis.chapter_2_dynamical_systems.figure_2_14 import sliding_events
 from variational.orbits import Event
-
-
-BELT = BeltOscillator(
-    belt=1.3, friction=0.4, weakening=0.0, damping=0.05, amplitude=0.9, omega=0.7
-)
 
 
 def grazing_belt() -> float:
@@ -176,32 +172,6 @@ def test_the_start_of_a_period_moves_away_from_an_impact():
             jaxcam.simulate(system, start, begin, begin + period).final,
             atol=1e-7,
         )
-
-
-class BeltWithStop(SwitchedSystem):
-    """A forced mass on a belt, with Stribeck friction, in front of a rigid stop."""
-
-    stop: float = 2.148
-    belt: float = 1.0
-
-    def switching(self, t, state):
-        return state[1] - self.belt
-
-    def branch(self, t, state, sides):
-        x, v = state
-        friction = 0.4 / (1.0 + 0.2 * sides[0] * (v - self.belt))
-        push = 0.9 * jnp.cos(0.7 * t) - sides[0] * friction
-        return jnp.stack([v, push - x - 0.1 * v])
-
-    def gap(self, t, state):
-        return self.stop - state[0]
-
-    def impact(self, t, state):
-        return state.at[1].multiply(-0.6)
-
-    @property
-    def period(self):
-        return 2 * jnp.pi / 0.7
 
 
 @pytest.mark.slow

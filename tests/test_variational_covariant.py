@@ -84,7 +84,7 @@ def test_mean_growth_is_the_spectrum():
     apart = np.abs(np.asarray(found.exponents) - np.asarray(known.exponents))
     stderr = np.asarray(known.stderr) * np.sqrt(6000 / 300)
     assert np.all(apart < 4 * stderr)
-    # their sum is that of the volume, turn by turn of the same motion
+    # their sum is that of the volume, which depends only on the impact rate
     volume = float(known.exponents.sum())
     assert abs(float(found.exponents.sum()) - volume) < 0.05 * abs(volume)
 

@@ -14,12 +14,12 @@ from jaxcam.hybrid.codes import RowKind
 _MOST = 2**24
 
 
-def _row(record, state):
+def _row(record, carried):
     """Return the place in the table (-1 for none) and the entries to store there: sums
     of the logarithms of growth, number of impacts and state at the end of a period.
     """
-    place = jnp.where(record.kind == float(RowKind.STOP), state.stops, -1.0)
-    return place, [*state.logs, state.impacts, *record.after]
+    place = jnp.where(record.kind == float(RowKind.STOP), carried.state.stops, -1.0)
+    return place, [*carried.logs, carried.state.impacts, *record.after]
 
 
 def frames_of_periods(

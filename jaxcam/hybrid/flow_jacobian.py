@@ -67,18 +67,6 @@ class JacobianState(NamedTuple):
     active: tuple
     rates: tuple[tuple, ...]
 
-    @property
-    def x(self) -> tuple:
-        return self.state.x
-
-    @property
-    def status(self):
-        return self.state.status
-
-    @property
-    def steps(self):
-        return self.state.steps
-
 
 class _Attempt(NamedTuple):
     """Takes one attempted step with its derivatives.
@@ -206,7 +194,7 @@ class _Loop(NamedTuple):
 
 
 def _row(record, lane: JacobianState):
-    return lane.steps - 1.0, [record.kind]
+    return lane.state.steps - 1.0, [record.kind]
 
 
 def _begun(case) -> tuple[_Loop, np.ndarray, np.ndarray]:

@@ -46,7 +46,9 @@ def fixed_by_flow(
     found = runs_by_llvm(
         settings,
         (system, guess, t0),
-        lambda: _fixed_by_llvm(system, *given[2:6], normal, sizes, free),
+        lambda: _fixed_by_llvm(
+            system, guess, start, period, settings, normal, sizes, free
+        ),
     )
     if found is None:
         state, period, success, _ = _over_period(
@@ -68,7 +70,7 @@ def derivatives_by_flow(system, values, where, state, t0, length, settings: Sett
     made = runs_by_llvm(
         settings,
         (system, values, state, start, period),
-        lambda: _by_llvm(system, *given[:6]),
+        lambda: _by_llvm(system, values, where, state, start, period, settings),
     )
     if made is not None:
         return made[1]

@@ -12,7 +12,7 @@ import numpy as np
 from jax.interpreters import partial_eval
 
 from ..caches import Cache
-from ..loop import Functions, iteration
+from ..loop import Functions, iteration, loop_state
 from ._kernel import COUNTERS, ENTRY, module_of, Program, ROUNDS, UNFINISHED
 from ._layout import Layout
 from ._machine import Compiled, compiled
@@ -77,7 +77,7 @@ def traced(key: Key) -> Program:
         system, plan = eqx.combine(*parts, static)
         lane = jax.tree.unflatten(key.lane, scalars)
         functions = Functions(
-            system, len(lane.x), plan.plain, shared=True, branches=True
+            system, len(loop_state(lane).x), plan.plain, shared=True, branches=True
         )
         after, record = key.step(functions, plan, lane)
         place, values = key.row(record, after)
@@ -91,7 +91,7 @@ def traced(key: Key) -> Program:
     closed = jax.make_jaxpr(attempt)(*map(shape, sizes), *scalars)
     wanted = [True] * len(closed.jaxpr.outvars)
     pruned, _ = partial_eval.dce_jaxpr(closed.jaxpr, wanted, instantiate=True)
-    places = jax.tree.unflatten(key.lane, range(len(scalars)))
+    places = loop_state(jax.tree.unflatten(key.lane, range(len(scalars))))
     return Program(
         pruned,
         closed.consts,

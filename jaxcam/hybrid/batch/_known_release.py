@@ -53,30 +53,6 @@ class ReleaseState(NamedTuple):
     state: LoopState
     release: Release
 
-    @property
-    def x(self) -> tuple:
-        return self.state.x
-
-    @property
-    def status(self):
-        return self.state.status
-
-    @property
-    def steps(self):
-        return self.state.steps
-
-    @property
-    def stops(self):
-        return self.state.stops
-
-    @property
-    def impacts(self):
-        return self.state.impacts
-
-    @property
-    def chatters(self):
-        return self.state.chatters
-
 
 def may_skip(start: LaneStart) -> bool:
     """Return whether the contacts of these batch elements can be skipped."""

@@ -16,7 +16,7 @@ from ..backend import (
     vector_width,
 )
 from ..codes import FINISHED, RUNNING
-from ..loop import iteration
+from ..loop import iteration, loop_state
 from ..lowering import pack
 from ._known_release import iteration_past_contacts, may_skip, with_releases
 from ._layout import compiled_chunk, Horizon, Lanes, LaneStart, start_lanes
@@ -97,7 +97,7 @@ def run_compiled(
         limit=max_steps,
         between=between,
     )
-    place = start.slots.rows
+    place = loop_state(start.slots.rows)
     columns = [place.impacts, place.steps, place.status]
     return tuple(numbers[:, columns].astype(int).T)
 

@@ -49,26 +49,6 @@ class TangentState(NamedTuple):
     frame: tuple[Varying, ...]
     logs: tuple
 
-    @property
-    def x(self) -> tuple:
-        return self.state.x
-
-    @property
-    def status(self):
-        return self.state.status
-
-    @property
-    def steps(self):
-        return self.state.steps
-
-    @property
-    def stops(self):
-        return self.state.stops
-
-    @property
-    def impacts(self):
-        return self.state.impacts
-
 
 def tangent_iteration(functions: Functions, plan: Plan, carried: TangentState):
     """Take one attempted step, with its derivative.

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..codes import RowKind
+from ..loop import loop_state
 from ._table import Table
 
 
@@ -31,5 +32,6 @@ def _row(record, lane):
     """Return the stop number, the numbers of impacts and of completed chatter sequences
     so far, and the state.
     """
-    stop = jnp.where(record.kind == float(RowKind.STOP), lane.stops, -1.0)
-    return stop, [lane.impacts, lane.chatters, *record.after]
+    state = loop_state(lane)
+    stop = jnp.where(record.kind == float(RowKind.STOP), state.stops, -1.0)
+    return stop, [state.impacts, state.chatters, *record.after]

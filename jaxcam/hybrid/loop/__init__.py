@@ -9,7 +9,11 @@ from ._functions import Functions as Functions
 from ._gap_polynomial import Jet as Jet
 from ._iterate import iteration as iteration
 from ._jumps import jumping_components as jumping_components
-from ._loop_state import first_state as first_state, LoopState as LoopState
+from ._loop_state import (
+    first_state as first_state,
+    loop_state as loop_state,
+    LoopState as LoopState,
+)
 from ._run import (
     attempts as attempts,
     Log as Log,

@@ -110,6 +110,11 @@ class LoopState(NamedTuple):
         return [j.gap < -(2e-12 * s + b) for j, s, b in zip(*rest, strict=True)]
 
 
+def loop_state(lane: Any) -> LoopState:
+    """Return the loop state of a batch element, which may carry more than that."""
+    return lane if isinstance(lane, LoopState) else lane.state
+
+
 def closed(mode: tuple, constraints: int, jets: int) -> tuple:
     """Return a flag for each of the `jets`: whether its constraint is in contact, and
     False for a switching surface.

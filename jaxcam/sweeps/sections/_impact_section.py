@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid import HybridSystem, Settings
+from ...hybrid.batch import loop_state
 from ...hybrid.codes import RowKind
 from ...parameters import pick
 from ._hybrid_lanes import Rows, run_tables
@@ -77,7 +78,7 @@ class _Row(NamedTuple):
     def __call__(self, record, lane):
         kind = record.kind
         hit = (kind == float(RowKind.IMPACT)) | (kind == float(RowKind.LAST_IMPACT))
-        earlier = lane.impacts - 1.0
+        earlier = loop_state(lane).impacts - 1.0
         ring = earlier - self.keep * jnp.floor(earlier * (1 / self.keep) + 1e-9)
         last = jnp.where(kind == float(RowKind.STOP), float(self.keep), -1.0)
         return jnp.where(hit, ring, last), [kind, record.t, *record.after]
