@@ -124,16 +124,18 @@ for label, more in steps.items():
 # The free-run predictions deviate from the second recording because the friction in
 # that recording is larger from the start, even before the first pulse: at the same
 # position and speed, the motor force is larger in both directions. No model fitted to
-# the first recording can predict this increase.
+# the first recording can predict this increase. Each line gives the mean magnitude of
+# the motor force in the first recording and the change of the force in the second.
 
 # +
 rate = np.gradient(estimation["position_m"], estimation.time)
 extra = pulses["motor_force_N"] - estimation["motor_force_N"]
 for name, there in {"forwards": rate > 0.02, "backwards": rate < -0.02}.items():
     usual = np.mean(np.abs(estimation["motor_force_N"][there]))
-    print(f"{name}: {usual:.1f} N, in the second {np.mean(extra[there]):+.2f} N more")
+    change = np.mean(extra[there])
+    print(f"{name}: {usual:.1f} N, {change:+.2f} N in the second recording")
 early = (pulses.time > 0.1) & (pulses.time < 0.3)
-print(f"before the first pulse: {np.mean(extra[early]):+.2f} N more")
+print(f"before the first pulse: {np.mean(extra[early]):+.2f} N")
 # -
 
 # ## A mounting head

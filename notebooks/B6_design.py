@@ -188,9 +188,9 @@ for rpm in (134.5, 135.5):
 # Above the float speed the follower has impacts, but the chatter completes in every
 # revolution, until it is interrupted and chaos begins (notebook B3). The speed of this
 # interruption is the root of a smooth equation, so it has a derivative with respect to
-# the coefficient of restitution. Which coefficient, obtained with a softer follower
-# face, raises the interruption to 165 rpm? Newton's method, which uses this derivative,
-# finds the coefficient.
+# the coefficient of restitution. A softer follower face has a lower coefficient. Which
+# coefficient raises the interruption to 165 rpm? Newton's method, which uses this
+# derivative, finds it.
 
 
 # +

@@ -163,8 +163,8 @@ def test_interrupted_run_says_so(monkeypatch):
     ("out", "resume", "words"),
     [
         (None, False, "run the command again to finish."),
-        (Path("DIR"), False, "add --resume to go on from what is stored."),
-        (Path("DIR"), True, "run it again to go on from what is stored."),
+        (Path("DIR"), False, "add --resume to continue from the stored results."),
+        (Path("DIR"), True, "run it again to continue from the stored results."),
     ],
 )
 def test_interrupted_command_says_how_to_go_on(out, resume, words, capsys):

@@ -197,7 +197,7 @@ def test_other_units_than_the_name_says(tmp_path):
     milliseconds = {**table, "time_s": table["time_s"] * 1e3}
     assert "milliseconds" in refusal(written(tmp_path, text(milliseconds)))
     file = written(tmp_path, text(table), "run1_170.0rpm.csv")
-    assert "150.0 rpm, but the file name says 170.0 rpm" in refusal(file)
+    assert "150.0 rpm, but the file name gives 170.0 rpm" in refusal(file)
 
 
 def test_dead_channel(tmp_path):

@@ -324,7 +324,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
 
     @property
     def representation(self) -> Unique:
-        """The representation of an orbit, whatever grazings its branch has passed."""
+        """The representation of an orbit, regardless of the grazings passed."""
         return Unique(family_of(self))
 
     def refreshed(self, u, parameters) -> "SingleShooting":

@@ -142,7 +142,7 @@ def _points(orbit):
 def _table(shares):
     from rich.table import Table
 
-    table = Table(title="attractors")
+    table = Table(title="Attractors")
     for column in ("attractor", "fraction of initial states", "standard error"):
         table.add_column(column)
     for name, share in shares.items():

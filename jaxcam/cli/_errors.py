@@ -64,7 +64,7 @@ def _interrupted(options: Mapping[str, object]) -> str:
     """Return how to finish an interrupted command, given its options."""
     if "resume" in options and options.get("out") is not None:
         added = "run it again" if options["resume"] else "add --resume"
-        again = f"{added} to go on from what is stored"
+        again = f"{added} to continue from the stored results"
     else:
         again = "run the command again to finish"
     return f"Stopped by Ctrl-C before the end; {again}."

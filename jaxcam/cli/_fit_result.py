@@ -62,8 +62,8 @@ class Result:
         )
         if ratio > Policy().as_noise and len(self.problem.records) > 1:
             sentence += (
-                " The model is incomplete, or the noise is larger than stated; "
-                "`jaxcam diagnose` with the same files seeks what is missing."
+                " The model is incomplete, or the noise is larger than stated; run "
+                "`jaxcam diagnose` with the same files to find missing physics."
             )
             drive = self.problem.model.drive
             if isinstance(drive, fitting.Input) and drive.interpolation == "hold":
@@ -202,8 +202,8 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
         output.print(sentence)
     if found.laws:
         output.print(
-            "Rough estimates of the restitution from single impacts; the result is the "
-            "fit of the whole motion above:"
+            "Rough estimates of the restitution from single impacts, for comparison "
+            "with the fit of the whole motion above:"
         )
     for name, law in found.laws.items():
         where = name.rpartition(", ")[0]

@@ -25,7 +25,7 @@ def new_rig(
     ],
 ) -> None:
     """
-    Write the two files of a new rig, a system in Python and a rig file, as an example.
+    Write an example of a rig for you to edit: a Python file and a rig file.
 
     \b
     Examples:

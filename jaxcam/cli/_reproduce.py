@@ -38,7 +38,7 @@ def reproduce(
         ),
     ] = _SIZES[0],
     list_: Annotated[
-        bool, typer.Option("--list", help="List the targets and compute nothing.")
+        bool, typer.Option("--list", help="List the targets without computing them.")
     ] = False,
     json_file: JsonFile = None,
     out: Annotated[

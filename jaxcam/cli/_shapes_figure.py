@@ -33,11 +33,11 @@ def caption(found: Diagnosis) -> str:
     else:
         start = f"The most significant corrections of {model}, at most {_MOST}."
     grey = (
-        " Grey: the same correction of the textbook model, where one missing effect "
-        "shows in several corrections."
+        " Grey: the same correction of the textbook model, in which one missing effect "
+        "may appear in several corrections."
         if any(panel.textbook is not None for panel in panels)
-        else " One missing effect shows in several of them; the verdict contains what "
-        "explains the data best."
+        else " One missing effect may appear in several of them; the verdict gives the "
+        "explanation that fits the data best."
         if changed(found) and not after
         else ""
     )

@@ -78,7 +78,7 @@ class Policy:
         4.0, "cost per sample below which a fit counts as near the data"
     )
     knock_offs: int = decides(
-        19, "number of knock-offs of a force, each of which must explain less than it"
+        19, "number of knock-offs of a force; it must explain more than each of them"
     )
     explains: float = decides(
         0.5,
@@ -159,7 +159,7 @@ class Policy:
 
     # settings that limit the search
     minutes: float = bounds(
-        20.0, "time (min, without other programs) after which no candidate is tried"
+        20.0, "time limit (min, without other programs) for trying further candidates"
     )
     named_time: float = bounds(
         0.5,
@@ -184,7 +184,7 @@ class Policy:
         50.0, "difference in BIC up to which a subset or a form is followed further"
     )
     helpful_cost: float = bounds(
-        0.7, "the search goes on if a term reduces the cost to less than this fraction"
+        0.7, "the search continues if a term reduces the cost below this fraction"
     )
     clear_gain: float = bounds(
         10.0,
@@ -269,7 +269,7 @@ class Policy:
     cause_worse: float = bounds(
         4.0, "multiple of the smallest misfit above which this series ends"
     )
-    cause_difference: float = bounds(1e-3, "relative step of finite differences there")
+    cause_difference: float = bounds(1e-3, "relative step of the finite differences")
     cause_fits: int = bounds(40, "maximum number of evaluations in that fit")
     trace_stride: float = bounds(
         0.1, "step in the trace of the monodromy matrix along a branch"
@@ -301,7 +301,7 @@ class Policy:
     )
     units_doubted: float = shows(
         1000.0,
-        "rms residual, in units of the noise, above which a caveat doubts the units",
+        "ratio of rms residual to noise above which a caveat questions the units",
     )
     moved_errors: float = shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"

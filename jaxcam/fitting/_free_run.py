@@ -91,7 +91,7 @@ def free_run(
 
     The initial state is the one whose motion best fits the first `samples` samples.
     From there on, the simulation uses only the measured input, so errors accumulate.
-    System-identification benchmarks test a model in this way, a fit piece by piece.
+    System-identification benchmarks use this test; a fit tests a model piece by piece.
 
     Args:
         model: A system with its sensors and its input, such as `found.model()`.
@@ -123,7 +123,7 @@ def free_run(
     channels = np.asarray(found.channels)
     if not np.all(np.isfinite(channels)):
         raise ValueError(
-            f"{run.name}: the free run does not stay finite; check the signs of the "
+            f"{run.name}: the free run diverges; check the signs of the "
             f"model's damping and stiffness."
         )
     below = np.flatnonzero(np.asarray(found.gap) < 0)

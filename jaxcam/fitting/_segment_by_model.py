@@ -58,11 +58,11 @@ def segment_by_model(
     of a gap depends on, impacts are jumps of this rate, and contacts are stretches in
     which it is zero. If the system has no gap, each recording is one flight.
 
-    If the motion itself bends within ten milliseconds as much as an impact bends it,
-    impacts are found with the model: it flies from each possible impact to the next,
-    and an impact without which it describes the samples as well is rejected. If there
-    are too few samples per oscillation, a note is added to the recording's
-    `meta["notes"]`.
+    If the velocity of the smooth motion changes within ten milliseconds as much as at
+    an impact, impacts are found with the model: a flight is simulated from each
+    possible impact to the next, and an impact is rejected if the samples are described
+    as well without it. If there are too few samples per oscillation, a note is added to
+    the recording's `meta["notes"]`.
 
     If parameters are given, they are fitted to short pieces of the flights. If the
     model describes most pieces but fails for one, that piece is searched for impacts

@@ -95,10 +95,10 @@ class Structure:
     quantity: str = ""
     """The quantity that `value` describes."""
     differs: bool = False
-    """Whether it certainly differs from recording to recording: with a value of its own
-    in each recording, it explains significantly more."""
+    """Whether it certainly differs from recording to recording: with a separate value in
+    each recording, it explains significantly more."""
     named: Mapping[str, Beside] = dataclasses.field(default_factory=dict)
-    """Far from the data, for each named term, what is lost without it: as the fit is,
+    """Far from the data, the loss of fit without each named term: in the present fit,
     and if the structure is fitted as well."""
 
     @property

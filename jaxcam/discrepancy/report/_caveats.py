@@ -57,8 +57,8 @@ def caveats_of(
 def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:
     """Return the caveat that a parameter differs from recording to recording.
 
-    **Arguments:** `called`: a description of the parameter, if its name says nothing to
-    a reader.
+    **Arguments:** `called`: a description of the parameter, if its name means nothing
+    to a reader.
     """
     return Caveat(
         Reason.DIFFERING,
@@ -101,10 +101,11 @@ def not_predictive(found: Rejected, functions: str) -> Caveat:
     held = found.held
     return Caveat(
         Reason.NOT_PREDICTIVE,
-        f"A {functions} fits the recordings but does not predict held-out flights: the "
-        f"residual there is {ratio(held.after)} times the noise, compared with "
-        f"{ratio(found.named.after)} times without it. It is therefore not reported. "
-        "Record more motions under the same conditions.",
+        f"A model with a {functions} fits the recordings but does not predict held-out "
+        f"flights: the residual there is {ratio(held.after)} times the noise, compared "
+        f"with {ratio(found.named.after)} times for the model without functions. This "
+        "explanation is therefore not reported. Record more motions under the same "
+        "conditions.",
     )
 
 
@@ -231,8 +232,9 @@ def by_chance(one: Shuffled) -> Caveat:
         Reason.CHANCE,
         f"A force that depends on {listed(one.arguments)} fits the recordings, but of "
         f"{len(one.shares)} functions of the same kind that take their arguments at "
-        f"other moments, the best explains {percent(one.best)} of what it explains. It "
-        "is therefore not reported. Record more motions under the same conditions.",
+        f"other moments, the best explains {percent(one.best)} of what this force "
+        "explains. The force is therefore not reported. Record more motions under the "
+        "same conditions.",
     )
 
 

@@ -126,8 +126,8 @@ class Diagnosis:
     heldout_after: float
     """Rms of the held-out residuals with the effects (in `unit`)."""
     noise_floor: float
-    """Rms of the noise that was used (in `unit`); a caveat says if it is larger than
-    the stated noise.
+    """Rms of the noise that was used (in `unit`); a caveat is given if it is larger
+    than the stated noise.
     """
     unit: str
     """Unit of the residuals."""
@@ -216,7 +216,7 @@ class Diagnosis:
     def model(self, record: int | str = 0) -> Model:
         """Return the model with the missing effects, for use in other functions.
 
-        Its sensors have their total lags, as recordings as they are do.
+        The lags of its sensors are total lags, as in the original recordings.
         """
         model = _whole_lags(self.after.model(record))
         if not isinstance(model.system, WithTerms):

@@ -99,7 +99,7 @@ def summary_of_functions(
     named = [effect.sentence for effect in effects if effect.term]
     beside = f" in addition to {listed(named)}" if named else ""
     words = " and ".join(one.words for one in functions)
-    found = f"An unnamed effect is missing{beside}: {words}."
+    found = f"The model lacks an unnamed effect{beside}: {words}."
     if held.after < held.before:
         factor, unit = scaled(unit, held.before * floor)
         before, after = (factor * floor * one for one in (held.before, held.after))
@@ -120,7 +120,7 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
     tail = ""
     for name, limit in least.items():
         size = quantity(f"{limit.size:.2g}", limit.unit)
-        tail = f" A {name} of {size} would have been detected."
+        tail = f" For example, {name} = {size} would have been detected."
         break
     if fitted > policy.as_noise:
         return (

@@ -97,8 +97,8 @@ class Sensor(eqx.Module):
 
     @property
     def in_flight_only(self) -> bool:
-        """Whether the channel says nothing about the motion in contact: the state of a
-        filter is not known there, and the contact force is not part of an output.
+        """Whether the channel contains no information on the motion in contact: the
+        state of a filter is not known there, and an output omits the contact force.
         """
         return self.filtered or isinstance(self.observe, Output)
 

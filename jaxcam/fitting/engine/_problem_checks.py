@@ -50,7 +50,7 @@ def refuse_hysteresis(model: Model) -> None:
     if isinstance(system, SwitchedSystem) and np.any(np.asarray(system.hysteresis) > 0):
         raise ValueError(
             f"{type(system).__name__} has switching surfaces with hysteresis: between "
-            "the thresholds, a piece of a recording does not tell on which side it "
+            "the thresholds, a piece of a recording does not show on which side it "
             "begins. Fit such a system with `jaxcam.simulate`, or set `hysteresis` to "
             "zero."
         )

@@ -265,7 +265,7 @@ def _release(motion: Motion, first: int, last: int, end: int) -> Boundary:
         motion.rate[rows],
         motion.noise,
     )
-    evidence = "the surface bends away from a free parabola from here"
+    evidence = "from here on, the surface curves away from a free parabola"
     return Boundary(time, stderr, "release", evidence)
 
 

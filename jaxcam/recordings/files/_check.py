@@ -119,6 +119,6 @@ def check_drive(recording: Recording) -> None:
         rpm = 30 / np.pi
         raise RecordingError(
             f"{recording.name}: the cam turns at {abs(speed) * rpm:.1f} rpm, but the "
-            f"file name says {nominal * rpm:.1f} rpm; correct the name or the column "
+            f"file name gives {nominal * rpm:.1f} rpm; correct the name or the column "
             f"`cam_angle_rad`."
         )

@@ -33,7 +33,7 @@ def compute(system: CamFollower) -> Rows:
     return [
         ("period", 60 / CONTACT_SPEED, rig.period, "s"),
         ("impacts in two turns", 0, run.impacts.count, ""),
-        ("least contact torque (thesis, eq. (4.10))", np.nan, load.min(), "N m"),
+        ("smallest contact torque (thesis, eq. (4.10))", np.nan, load.min(), "N m"),
         ("largest contact torque (thesis, eq. (4.10))", np.nan, load.max(), "N m"),
         ("lowest contact angle", np.nan, lift.min(), "rad"),
         ("highest contact angle", np.nan, lift.max(), "rad"),
