@@ -130,14 +130,14 @@ def free_run(
     if len(below):
         raise ValueError(
             f"{run.name}: the free run meets a constraint at "
-            f"{run.time[below[0]]:.4g} s; a free run is for motions without impacts, "
-            f"use `jaxcam.simulate` for others."
+            f"{run.time[below[0]]:.4g} s; free runs cannot contain impacts, so use "
+            f"`jaxcam.simulate` instead."
         )
     crowded = np.flatnonzero(np.asarray(found.events)[:-1] >= _EVENTS)
     if len(crowded):
         raise ValueError(
             f"{run.name}: the free run has at least {_EVENTS} switching events between "
-            f"the sample at {run.time[crowded[0]]:.4g} s and the next, and no more are "
+            f"the sample at {run.time[crowded[0]]:.4g} s and the next, too many to be "
             f"located; give a recording with shorter sampling intervals."
         )
     data = np.asarray(one.data)

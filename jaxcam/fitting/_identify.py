@@ -76,7 +76,7 @@ class Identifiability:
         if self.lost:
             found.append(
                 f"At the nominal parameters, the motion in {_listed(self.lost)} is so "
-                f"sensitive that rounding exceeds the information, so "
+                f"sensitive that rounding errors exceed the information, so "
                 f"{'it is' if len(self.lost) == 1 else 'they are'} not counted here."
             )
         dead = [n for n, a in zip(self.names, self.alone) if not np.isfinite(a)]

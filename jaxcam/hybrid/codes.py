@@ -82,8 +82,8 @@ class RESULTS(eqx.Enumeration, metaclass=_ByCode):
     """Crossings of a switching surface accumulate."""
     painleve = (
         "Friction makes the contact force ambiguous or impossible (a Painlevé "
-        "configuration): while the body slips, pressing it against the constraint "
-        "does not push it away. Choose a smaller friction coefficient, or model the "
+        "configuration): while the body slips, a contact force does not push it away "
+        "from the constraint. Choose a smaller friction coefficient, or model the "
         "contact as a compliant force in the vector field."
     )
     """Because of friction, a contact force does not exist or is not unique."""

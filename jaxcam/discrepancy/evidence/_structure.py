@@ -95,8 +95,8 @@ class Structure:
     quantity: str = ""
     """The quantity that `value` describes."""
     differs: bool = False
-    """Whether it certainly differs from recording to recording: with a separate value in
-    each recording, it explains significantly more."""
+    """Whether it certainly differs from recording to recording: a separate value for
+    each recording explains significantly more."""
     named: Mapping[str, Beside] = dataclasses.field(default_factory=dict)
     """Far from the data, the loss of fit without each named term: in the present fit,
     and if the structure is fitted as well."""

@@ -65,8 +65,9 @@ def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:
         f"The recordings differ: a separate {called or spelled(found.name)} for each "
         "of them "
         f"({_values_of(found, policy)}) explains {percent(found.share)} of the squared "
-        f"residual above the noise and leaves {ratio(found.left)} times the noise. The "
-        "quantity that this parameter represents has changed between the recordings.",
+        "residual above the noise and leaves a residual of "
+        f"{ratio(found.left)} times the noise. The quantity that this parameter "
+        "represents has changed between the recordings.",
     )
 
 
@@ -79,7 +80,7 @@ def may_differ(found: Differing, policy: Policy) -> Caveat:
         f"A separate {spelled(found.name)} for each recording "
         f"({_values_of(found, policy)}) would explain the data as well as the function "
         "does. Make a recording in which the motion varies over the ranges of several "
-        "of these recordings: only the function predicts it.",
+        "of these recordings: only the function would predict it.",
     )
 
 

@@ -55,11 +55,11 @@ _WORDS = {
     "forward": "acts only while the {x} is positive",
     "falling": "opposes the motion near rest and decreases with the {x}, over about "
     "{decay}",
-    "curved above": "acts only above {x} {a}, and grows from there to the power "
-    "{exponent}",
-    "curved below": "acts only below {x} {a}, and grows from there to the power "
-    "{exponent}",
-    "dead zone": "does not act between {x} {left} and {right}, and grows from there",
+    "curved above": "acts only above {x} {a}, and grows from there with "
+    "the power {exponent} of the distance",
+    "curved below": "acts only below {x} {a}, and grows from there with "
+    "the power {exponent} of the distance",
+    "dead zone": "does not act between {x} {left} and {right}, and grows beyond them",
     "saturating": "changes with the {x} around {a}, over about {width}, and saturates",
     "fast": "acts only where the speed exceeds {edge}, and grows from there",
     "power of speed": "grows as the speed to the power {power}",

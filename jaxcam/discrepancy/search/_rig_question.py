@@ -113,7 +113,7 @@ def _check(rig: Rig, runs: Sequence[Recording]) -> None:
             )
         raise RecordingError(
             f"{run.name}: the smallest value of `{_FOLLOWER}` is {least:.3g} rad, "
-            f"whereas the cam of this rig is between {low:.3g} and {high:.3g} rad; "
+            f"whereas on this cam the angle is between {low:.3g} and {high:.3g} rad; "
             "check that the column and the rig file belong to this recording, and "
             "that the unit is rad."
         )

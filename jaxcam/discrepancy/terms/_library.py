@@ -42,7 +42,7 @@ class ViscousDamping(Term):
     """Damping proportional to the velocity, `-c1 v`."""
 
     name: ClassVar[str] = "viscous_damping"
-    sentence: ClassVar[str] = "viscous damping, a force against the velocity"
+    sentence: ClassVar[str] = "viscous damping, a force opposing the motion"
     region: ClassVar[str] = "in flight, in proportion to the speed"
     source: ClassVar[str] = "Rayleigh, The Theory of Sound, 1877, section 45"
     c1: float = strength("1/s", 0.1, lower=0.0)
@@ -91,7 +91,7 @@ class QuadraticDrag(Term):
     """Turbulent drag, `-c2 |v| v`."""
 
     name: ClassVar[str] = "quadratic_drag"
-    sentence: ClassVar[str] = "quadratic drag, as from moving air or oil"
+    sentence: ClassVar[str] = "quadratic drag, as from air or oil"
     region: ClassVar[str] = "in flight, at large speeds"
     source: ClassVar[str] = "Batchelor, An Introduction to Fluid Dynamics, 5.11"
     c2: float = strength("1/[q]", 0.1, lower=0.0)
@@ -118,7 +118,7 @@ class CamProfileError(Term):
     """A cam that is out of round by `run cos(2 phi + lead)`; phi is the drive angle."""
 
     name: ClassVar[str] = "cam_profile_error"
-    sentence: ClassVar[str] = "an error of the profile, twice per period of the drive"
+    sentence: ClassVar[str] = "a profile error, twice per period of the drive"
     where: ClassVar[str] = Where.CONTACT
     region: ClassVar[str] = "at impacts and in contact, as a function of drive angle"
     source: ClassVar[str] = "Norton, Cam Design and Manufacturing Handbook, chapter 12"

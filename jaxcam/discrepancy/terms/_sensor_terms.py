@@ -20,7 +20,7 @@ class SensorGain(SensorTerm):
     """A wrong gain of the sensor."""
 
     name: ClassVar[str] = "sensor_gain"
-    sentence: ClassVar[str] = "a wrong gain of the sensor"
+    sentence: ClassVar[str] = "an error in the gain of the sensor"
     region: ClassVar[str] = "in the measured motion, in proportion to it"
     source: ClassVar[str] = "Doebelin, Measurement Systems, chapter 3"
     listed: ClassVar[bool] = False

@@ -84,7 +84,7 @@ class BilinearSpring(_WithEdge):
     """A stiffness that changes at a knee, `-kb max(q - knee, 0)`."""
 
     name: ClassVar[str] = "bilinear_spring"
-    sentence: ClassVar[str] = "a stiffness that changes at a position"
+    sentence: ClassVar[str] = "a stiffness that changes at a certain position"
     region: ClassVar[str] = "in flight, beyond the knee"
     source: ClassVar[str] = "Shaw and Holmes, Journal of Sound and Vibration 1983"
     kb: float = strength("1/s^2", 1.0)
