@@ -79,7 +79,10 @@ def basins(
     shares = made.shares
     output.print(_table(shares))
     listed = ", ".join(f"{name} {share.share:.2%}" for name, share in shares.items())
-    sentence = f"{system}: of {_count(made)} admissible initial states, {listed}."
+    sentence = (
+        f"{system}: fractions of the {_count(made)} admissible initial states, by "
+        f"attractor: {listed}."
+    )
     output.print(sentence)
     output.print_figures(figures)
     output.write_json(
