@@ -33,6 +33,7 @@ TITLES = {
     "cam_follower_chart": "Cam-follower chart",
     "curves_in_two_parameters": "Bifurcation curves in a two-parameter plane",
     "fit_with_band": "Fit with noise band",
+    "held_out_residuals": "Held-out residuals",
     "stick_slip": "Stick-slip",
 }
 # dots per inch
