@@ -74,9 +74,8 @@ def branch(
     begun = start.problem if isinstance(start, Start) else problem
     leaf, name = pick_one(where, begun.parameters)
     empty = Branch((), name, checked_bounds(bounds, name), leaf, (name,))
-    # the start and the end are counted, too
-    most = 2 + (settings or BranchSettings()).max_points
-    parts = 2 if direction == "both" else 1
+    # the start and the end of each part are counted, too
+    most = (2 + (settings or BranchSettings()).max_points) * (1 + (direction == "both"))
 
     def walk(direction: int, path: Path | None, done: float = 0.0) -> list[Point]:
         points, save, begin = [], None, start
@@ -102,7 +101,7 @@ def branch(
                 save(point)
             if progress is not None and not point.special:
                 ordinary = sum(not one.special for one in points)
-                progress(done + min(ordinary / most, 1.0) / parts)
+                progress(done + ordinary / most)
             # call every callback, even if one of them ends the branch
             if any([callback(point) is True for callback in stop]):
                 break

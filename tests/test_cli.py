@@ -333,6 +333,7 @@ def test_demo_compares_the_shipped_recording(demonstration):
     assert modes == {"flight", "contact", "impact position", "impact speed"}
     for mode in modes:
         assert mode in shown
+    assert "are simulated." in shown and "rad rms" in shown
     # the nominal rig is close to the recorded one, and rests in the same places
     slowest = found["runs"][0]["rests"]
     assert slowest["recorded"]["per_turn"] > 0.7
