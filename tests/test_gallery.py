@@ -39,6 +39,19 @@ def test_the_page_is_what_the_scripts_make_of_it(make):
     assert make.PAGE.read_text("utf-8") == make.page()
 
 
+def test_a_tutorial_shows_the_figures_that_its_code_saves(make):
+    docs = GALLERY.parent
+    for name in make.TUTORIALS:
+        text, figures = (docs / name).read_text("utf-8"), make.saved(name)
+        assert len(figures) == text.count("save_figure(")
+        for figure in figures:
+            for theme in ("light", "dark"):
+                assert f"({figure}-{theme}.png#only-{theme})" in text
+                picture = Image.open(docs / f"{figure}-{theme}.png").convert("L")
+                corner = np.asarray(picture)[-3:, :3]
+                assert np.all(corner > 250 if theme == "light" else corner < 60)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["chatter_map", "zeno_staircase"])
 def test_a_script_draws_its_picture(name, make, tmp_path, monkeypatch):
