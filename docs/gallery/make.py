@@ -130,7 +130,11 @@ def _write(figure: Figure, path: Path) -> None:
     with style():
         figure.savefig(drawn, dpi=DOTS, facecolor=figure.get_facecolor())
     picture = Image.open(drawn).convert("RGB")
-    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    # keeps the colour of a few thin lines, which has a meaning
+    few = picture.quantize(
+        COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+    )
+    few.save(path, optimize=True)
 
 
 def page() -> str:
