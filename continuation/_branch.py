@@ -28,6 +28,7 @@ def branch(
     settings: BranchSettings | None = None,
     direction: int | str = 1,
     callbacks: Iterable[Callable[[Point], Any]] = (),
+    progress: Callable[[float], None] | None = None,
     out: str | os.PathLike | None = None,
     resume: bool = False,
 ) -> Branch:
@@ -44,8 +45,10 @@ def branch(
         settings: Accuracy and step control.
         direction: 1 or -1; or `"both"`, in which case the parts towards smaller and
             larger parameters are joined in order and relabelled.
-        callbacks: Called with each point as it is found, for example to show progress
-            or to save it. If a callback returns True, the branch ends.
+        callbacks: Called with each point as it is found, for example to save it. If a
+            callback returns True, the branch ends.
+        progress: Called after each point with the fraction of `settings.max_points`
+            computed, and with 1 at the end. Most branches end earlier, at a bound.
         out: A file to which each point is appended, for [`continuation.load_branch`][];
             for `"both"`, the part towards smaller parameters has its own `.back` file.
         resume: Whether to continue an interrupted call from the points in `out`. The
@@ -71,8 +74,10 @@ def branch(
     begun = start.problem if isinstance(start, Start) else problem
     leaf, name = pick_one(where, begun.parameters)
     empty = Branch((), name, checked_bounds(bounds, name), leaf, (name,))
+    # the start and the end of each part are counted, too
+    most = (2 + (settings or BranchSettings()).max_points) * (1 + (direction == "both"))
 
-    def walk(direction: int, path: Path | None) -> list[Point]:
+    def walk(direction: int, path: Path | None, done: float = 0.0) -> list[Point]:
         points, save, begin = [], None, start
         if path is not None:
             header = header_of(
@@ -94,6 +99,9 @@ def branch(
             points.append(point)
             if save is not None:
                 save(point)
+            if progress is not None and not point.special:
+                ordinary = sum(not one.special for one in points)
+                progress(done + ordinary / most)
             # call every callback, even if one of them ends the branch
             if any([callback(point) is True for callback in stop]):
                 break
@@ -102,22 +110,30 @@ def branch(
     path = None if out is None else Path(out)
     if direction == "both":
         back_path = None if path is None else path.with_suffix(".back" + path.suffix)
-        back, forth = walk(-1, back_path), walk(1, path)
-        if back[-1].reason.startswith("the branch is closed"):
-            points = tuple(back)
-        else:
-            turned = [
-                replace(
-                    p, tangent=-p.tangent, arclength=-p.arclength,
-                    kind="regular" if p.kind == "start" else p.kind,
-                )
-                for p in reversed(back)
-            ]  # fmt: skip
-            points = relabelled([*turned, *forth[1:]])
+        back, forth = walk(-1, back_path), walk(1, path, 0.5)
+        points = _joined(back, forth)
     else:
         assert isinstance(direction, int)
         points = tuple(walk(direction, path))
+    if progress is not None:
+        progress(1.0)
     return dataclasses.replace(empty, points=points)
+
+
+def _joined(back: list[Point], forth: list[Point]) -> tuple[Point, ...]:
+    """Return the points of both directions in order."""
+    if back[-1].reason.startswith("the branch is closed"):
+        return tuple(back)
+    turned = [
+        replace(
+            point,
+            tangent=-point.tangent,
+            arclength=-point.arclength,
+            kind="regular" if point.kind == "start" else point.kind,
+        )
+        for point in reversed(back)
+    ]
+    return relabelled([*turned, *forth[1:]])
 
 
 def _written(path: Path, header: dict, problem: AbstractProblem) -> list[Point]:

@@ -65,6 +65,7 @@ def cascade(
     settings: BranchSettings | None = None,
     direction: int = 1,
     callbacks: Iterable[Callable[[Point], Any]] = (),
+    progress: Callable[[float], None] | None = None,
 ) -> Cascade:
     """Follow a branch to its flip, the period-doubled branch to its flip, and so on.
 
@@ -78,7 +79,9 @@ def cascade(
         algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         flips: Number of flips to locate.
         settings: Accuracy and step control.
-        callbacks: Called with each point as it is found, for example to show progress.
+        callbacks: Called with each point as it is found.
+        progress: Called after each branch with the fraction of `flips` located, and
+            with 1 at the end.
         direction: 1 to start towards larger parameters, -1 towards smaller ones.
 
     Returns:
@@ -115,6 +118,8 @@ def cascade(
             if point.kind == FLIP and point.converged:
                 break
         branches.append(Branch(tuple(points), name, bounds, leaf, (name,)))
+        if progress is not None and len(branches) < flips:
+            progress(len(branches) / flips)
         last = points[-1]
         if last.kind != FLIP or len(branches) == flips:
             break
@@ -126,4 +131,6 @@ def cascade(
         longest = max(min(walk.max_step, longest), 4 * walk.min_step)
         first = min(walk.step, longest / 4)
         walk = with_field(with_field(walk, "max_step", longest), "step", first)
+    if progress is not None:
+        progress(1.0)
     return Cascade(tuple(branches))

@@ -88,6 +88,7 @@ def curve(
     settings: BranchSettings | None = None,
     direction: int | str = "both",
     callbacks: Iterable[Callable[[Point], Any]] = (),
+    progress: Callable[[float], None] | None = None,
     out: str | os.PathLike | None = None,
     resume: bool = False,
 ) -> Branch:
@@ -104,6 +105,7 @@ def curve(
         settings: Accuracy and step control.
         direction: As for [`continuation.branch`][].
         callbacks: As for [`continuation.branch`][].
+        progress: As for [`continuation.branch`][].
         out: As for [`continuation.branch`][].
         resume: As for [`continuation.branch`][].
 
@@ -142,7 +144,7 @@ def curve(
     found = branch(
         problem, Start(problem, u), second, bounds_2, algorithm,
         settings=settings, direction=direction, callbacks=callbacks,
-        out=out, resume=resume,
+        progress=progress, out=out, resume=resume,
     )  # fmt: skip
     names = (pick_one(first, problem.parameters)[1], name)
     return Branch(found.points, name, found.bounds, found.leaf, names)

@@ -131,6 +131,9 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
     assert "http" not in page.replace("http-equiv", "")
     assert "One caveat." in page
     assert ("viscous damping" in page) == bool(effects)
+    # a limit is that of an effect, and errors have the unit of the figures
+    assert "<td class=text>Coulomb friction</td><td class=text>fc</td>" in page
+    assert "is 0.2 mrad with the textbook model" in page
     assert '"verdict"' in to_text(found.to_json())
 
 

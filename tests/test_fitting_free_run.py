@@ -182,8 +182,16 @@ def test_a_fit_by_free_runs_finds_the_truth():
     for seed in (8, 9):
         force = pushed(seed)
         runs.append(recorded(carted(force, 0.1, 0.3), force, f"run{seed}"))
-    found = fit_free_run(model(inverse_mass=0.8, viscous=0.9), runs, PARAMETERS)
+    told = []
+    found = fit_free_run(
+        model(inverse_mass=0.8, viscous=0.9),
+        runs,
+        PARAMETERS,
+        progress=lambda number, cost: told.append((number, cost)),
+    )
     assert found.converged
+    assert [number for number, _ in told] == list(range(1, len(told) + 1))
+    assert told[-1][1] < 1e-6 * told[0][1]
     assert found.values["1/mass"] == pytest.approx(1.0, rel=1e-7)
     assert found.values["viscous"] == pytest.approx(0.5, rel=1e-6)
     assert [run.rmse["position_m"] < 1e-6 for run in found.runs] == [True, True]

@@ -5,7 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from PIL import Image
+
+from jaxcam.plotting.colours import CONTACT, FLIGHT, IMPACT
 
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
@@ -35,8 +38,29 @@ def test_pictures_are_small_and_as_dark_as_their_names_say():
         assert np.all(corner > 250) if "light" in file.stem else np.all(corner < 60)
 
 
+def test_few_colours_keep_that_of_a_thin_line():
+    """The dashes of an impact are a hundred pixels of a picture of 64 colours."""
+    drawn = np.asarray(Image.open(GALLERY / "phase_portrait-light.png").convert("RGB"))
+    for colour in (CONTACT, FLIGHT, IMPACT):
+        away = np.abs(drawn - 255 * np.array(to_rgb(colour))).sum(axis=-1)
+        assert np.sum(away < 20) > 50, colour
+
+
 def test_the_page_is_what_the_scripts_make_of_it(make):
     assert make.PAGE.read_text("utf-8") == make.page()
+
+
+def test_a_tutorial_shows_the_figures_that_its_code_saves(make):
+    docs = GALLERY.parent
+    for name in make.TUTORIALS:
+        text, figures = (docs / name).read_text("utf-8"), make.saved(name)
+        assert len(figures) == text.count("save_figure(")
+        for figure in figures:
+            for theme in ("light", "dark"):
+                assert f"({figure}-{theme}.png#only-{theme})" in text
+                picture = Image.open(docs / f"{figure}-{theme}.png").convert("L")
+                corner = np.asarray(picture)[-3:, :3]
+                assert np.all(corner > 250 if theme == "light" else corner < 60)
 
 
 @pytest.mark.slow

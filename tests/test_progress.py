@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from continuation_examples import a, CUSP, cusp_start
+from continuation_examples import a, CUSP, cusp_start, LOGISTIC
 from sweep_maps import SQUARE_ROOT
 
 import continuation
@@ -57,6 +57,25 @@ def test_cells_in_several_blocks():
     assert (
         np.mean(one.group[10] == left) > 0.9 and np.mean(one.group[80] == right) > 0.9
     )
+
+
+def test_a_branch_in_both_directions():
+    shares, one, other = _shares(
+        lambda told: continuation.branch(
+            CUSP, cusp_start(-1.0), a, (-3.0, 3.0), direction="both", progress=told
+        )
+    )
+    assert len(shares) > 10 and any(share > 0.5 for share in shares[:-1])
+    assert np.array_equal(one.states, other.states)
+
+
+def test_a_cascade():
+    shares, *_ = _shares(
+        lambda told: continuation.cascade(
+            LOGISTIC, [0.5], "mu", (1.5, 4.0), flips=2, progress=told
+        )
+    )
+    assert shares == [0.5, 1.0]
 
 
 def test_a_batch_of_branches():

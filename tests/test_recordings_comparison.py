@@ -93,12 +93,18 @@ def test_what_is_missing_shows_in_its_own_mode(tmp_path):
     assert found.row("impact speed").ratio < 1.3
     wrong_law = true_rig(RealRig(restitution=0.5))
     assert compare_case(wrong_law, case).row("impact speed").ratio > 2
-    assert "In flight, the follower angle differs from the model" in found.sentence()
+    sentence = found.sentence()
+    assert "In flight, the follower angle differs from the model" in sentence
+    # in the unit of the figures
+    assert f"({1e3 * found.row('flight').rms:.2g} mrad rms over" in sentence
 
 
 def test_the_demonstration_runs():
     case = segment_case(read_case(DEMO_RIG), read_rig(DEMO_RIG / "rig.toml"))
-    found = compare_case(read_rig(DEMO_RIG / "rig.toml"), case)
+    shares = []
+    rig = read_rig(DEMO_RIG / "rig.toml")
+    found = compare_case(rig, case, progress=shares.append)
+    assert shares == [1 / 3, 2 / 3, 1.0]
     modes = [row.mode for row in found.rows]
     assert modes == ["flight", "contact", "impact position", "impact speed"]
     assert found.row("flight").worst_record in {part.recording.name for part in case}

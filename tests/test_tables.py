@@ -8,6 +8,7 @@ import pytest
 
 import jaxcam
 from continuation import Branch, Point
+from jaxcam import sweeps
 from jaxcam.discrepancy import Diagnosis
 from jaxcam.discrepancy.report import Effect
 from jaxcam.discrepancy.terms import Value
@@ -126,3 +127,25 @@ def test_a_stroboscope_prints_a_row_for_each_trajectory():
     lines = str(found).splitlines()
     assert lines[0] == "trajectories: 2, failed: 0, samples of each: 2"
     assert lines[1].split()[-1] == "sample" and len(lines) == 4
+
+
+def test_sweeps_print_the_labels_of_their_motions():
+    logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+    made = sweeps.diagram(logistic, "mu", [2.7, 2.8, 3.2], [0.3], keep=16)
+    lines = str(made).splitlines()
+    assert lines[0] == "Diagram of mu: 3 values, 1 start, 16 samples of each motion."
+    assert lines[1].split() == ["motion", "lowest", "mu", "highest", "mu"]
+    assert [line.split()[-2:] for line in lines[2:]] == [["2.7", "2.8"], ["3.2", "3.2"]]
+    assert made._repr_html_().count("<tr>") == 3
+
+    cubic = sweeps.Map(lambda x, p: 1.5 * x - 0.5 * x**3)
+    lines = str(sweeps.basins(cubic, sweeps.Grid([-1.0], [1.0], [10]))).splitlines()
+    assert lines[0] == "Basins of 2 attractors, 10 states."
+    assert len(lines) == 4 and all("50.0%" in line for line in lines[2:])
+
+    parts = lambda x, p: p["a"] + p["b"] * x - x**2
+    quadratic = sweeps.Map(parts, {"a": 0.0, "b": 0.5})
+    chart = sweeps.chart(quadratic, ("a", "b"), [0.0, 0.1], [0.4, 0.5], [0.1])
+    lines = str(chart).splitlines()
+    assert lines[0] == "Chart of a (2 values) and b (2 values)."
+    assert lines[2].split()[-1] == "100.0%" and len(lines) == 3

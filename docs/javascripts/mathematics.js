@@ -4,6 +4,6 @@ document.addEventListener("DOMContentLoaded", () => {
     const text = element.textContent.trim();
     const formula = text.match(/^\\[([]([\s\S]*)\\[)\]]$/);
     if (formula)
-      katex.render(formula[1], element, { displayMode: text[1] === "[" });
+      katex.render(formula[1], element, { displayMode: text[1] === "[", throwOnError: false });
   }
 });

@@ -5,6 +5,9 @@ from pathlib import Path
 from ._files_options import Files
 
 
+SIMULATED = "These recordings, shipped with the package, are simulated."
+
+
 def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
     """Read the recordings in a folder or in a single file, and their rig file.
 
@@ -59,9 +62,21 @@ def _runs(case: Path, channels, files: Files, layout):
     return read_case(case, **options)
 
 
-def notes_of(runs) -> tuple[str, ...]:
-    """Return notes on the repairs made while reading the recordings, each note once."""
-    return tuple(dict.fromkeys(n for run in runs for n in run.meta.get("notes", ())))
+def notes_of(runs, case: Path) -> tuple[str, ...]:
+    """Return notes on the origin of the recordings and on the repairs made while
+    reading them, each note once.
+    """
+    notes = [note for run in runs for note in run.meta.get("notes", ())]
+    return tuple(dict.fromkeys([*origin_of(case), *notes]))
+
+
+def origin_of(case: Path) -> tuple[str, ...]:
+    """Return a sentence if the recordings are the simulated ones of the package."""
+    from ..data import DEMO_RIG
+
+    if DEMO_RIG not in (case, case.parent):
+        return ()
+    return (SIMULATED,)
 
 
 def _rig_file(folder: Path, rig: Path | None) -> Path:

@@ -68,7 +68,7 @@ def demo(
     from ..recordings import Rig
     from ._beside import beside
     from ._cache import keep_compiled_programs
-    from ._case import read
+    from ._case import origin_of, read
     from ._demo_branches import follow_branches
     from ._demo_result import compared, print_result, write_result
     from ._files_options import Files
@@ -76,7 +76,9 @@ def demo(
     from ._progress import progress
 
     keep_compiled_programs()
-    runs, nominal = read(DEMO_RIG if case is None else case, rig, Files(gaps))
+    folder = DEMO_RIG if case is None else case
+    origin = origin_of(folder)
+    runs, nominal = read(folder, rig, Files(gaps))
     if not isinstance(nominal, Rig):
         raise ValueError(
             f"{case} is not a cam-follower rig, which jaxcam demo requires; use "
@@ -90,11 +92,11 @@ def demo(
         found = compared(runs, nominal, out, report)
         lacks = None
         if diagnose and len(found.segments) > 1:
-            lacks = _diagnosed(out / "diagnosis", nominal, found, report)
+            lacks = _diagnosed(out / "diagnosis", nominal, found, origin, report)
         if branches:
             report("following branches of orbits", None)
         found = dataclasses.replace(
-            found, lacks=lacks, branches=followed(), simulated=case is None
+            found, lacks=lacks, branches=followed(), simulated=bool(origin)
         )
     result = write_result(out, found)
     print_result(output, found)
@@ -102,7 +104,7 @@ def demo(
     output.write_json(result)
 
 
-def _diagnosed(folder: Path, nominal, found, report):
+def _diagnosed(folder: Path, nominal, found, notes, report):
     """Diagnose the model discrepancy, and write a separate report."""
     from .. import discrepancy
     from ._diagnose_files import write_diagnosis
@@ -111,5 +113,5 @@ def _diagnosed(folder: Path, nominal, found, report):
         nominal, found.segments, case=found.case, progress=report
     )
     report("drawing", None)
-    write_diagnosis(folder, lacks, ())
+    write_diagnosis(folder, lacks, notes)
     return lacks

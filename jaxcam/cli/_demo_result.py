@@ -8,6 +8,7 @@ from typing import Any
 from ..discrepancy import Diagnosis
 from ..recordings import merge, Rig, segment_case, Segments
 from ..recordings.against_model import compare_case, Comparison
+from ._case import SIMULATED
 from ._demo_branches import Branches
 from ._demo_figures import draw
 from ._output import Output, to_text, write_text
@@ -95,7 +96,7 @@ def write_result(folder: Path, found: DemoResult) -> dict[str, Any]:
 def print_result(output: Output, found: DemoResult) -> None:
     """Print tables and sentences to the terminal."""
     if found.simulated:
-        output.print("These recordings, shipped with the package, are simulated.")
+        output.print(SIMULATED)
     for run in found.segments:
         output.print(run.sentence())
     output.print(found.comparison.table())

@@ -99,7 +99,7 @@ def diagnose(
         )
         # the segmentation may add a note to a recording
         used = (part.recording for part in found.after.problem.segments)
-        notes, figures = notes_of([*runs, *used]), []
+        notes, figures = notes_of([*runs, *used], case), []
         if out is not None:
             report("drawing", None)
             figures = write_diagnosis(out, found, notes)
@@ -195,19 +195,13 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
 
 
 def _print(output, found, notes, outlook) -> None:
-    from ._changed import changed
+    from ._diagnosis_page import held_out_error
     from ._outlook import terminal_table
 
     caveats = (caveat.sentence for caveat in found.caveats)
     for sentence in (*notes, found.summary, *caveats):
         output.print(sentence)
-    after = ""
-    if changed(found):
-        after = f", {found.heldout_after:.3e} with the missing effects"
-    output.print(
-        f"Error on held-out flights: {found.heldout_before:.3e} {found.unit} with the "
-        f"textbook model{after}; noise: {found.noise_floor:.3e}."
-    )
+    output.print(held_out_error(found))
     for table in outlook.tables():
         output.print(terminal_table(table))
     if output.folder is not None:

@@ -57,14 +57,14 @@ _MISSING = (
     "absorbed any part that they can represent."
 )
 _UNSEEN = (
-    "Residuals of a held-out recording, predicted one flight ahead: the textbook "
-    "model refitted to the other recordings (top), and the model with the missing "
-    "effects (bottom). The band is +-2 standard deviations of the noise."
+    "Residuals of held-out sections of a recording, predicted one flight ahead after a "
+    "fit to the other sections: the textbook model (top), and the model with the "
+    "missing effects (bottom). The band is +-2 standard deviations of the noise."
 )
 _UNSEEN_ALONE = (
-    "Residuals of a held-out recording, predicted one flight ahead by the textbook "
-    "model refitted to the other recordings. The band is +-2 standard deviations of "
-    "the noise."
+    "Residuals of held-out sections of a recording, predicted one flight ahead by the "
+    "textbook model after a fit to the other sections. The band is +-2 standard "
+    "deviations of the noise."
 )
 _MAPS = (
     "Mean residual of each recording against {}, in standard errors, before (left) "

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ..discrepancy import Diagnosis, Verdict
+from ..discrepancy import Diagnosis, library, Verdict
 from ..discrepancy.report import listed, number, spelled
 from ..tables import scaled
 from ._changed import changed
@@ -109,18 +109,21 @@ def _knock_offs(found: Diagnosis) -> list[str]:
     ]
 
 
-def _before_and_after(found: Diagnosis) -> list[str]:
-    # choose the same unit as in the figures
+def held_out_error(found: Diagnosis) -> str:
+    """Return a sentence on the held-out error, in the unit of the figures."""
     factor, unit = scaled(found.unit, REACH * found.noise_floor)
     after = ""
     if changed(found):
         after = f" and {factor * found.heldout_after:.3g} with the missing effects"
-    parts = [
-        "<h2>Error on held-out flights</h2>",
-        f"<p>The error is {factor * found.heldout_before:.3g} {unit} with the "
-        f"textbook model{after}; the noise and rounding of the sensor amount to "
-        f"{factor * found.noise_floor:.3g}.</p>",
-    ]
+    return (
+        f"The error on held-out flights is {factor * found.heldout_before:.3g} {unit} "
+        f"with the textbook model{after}; the noise and rounding of the sensor amount "
+        f"to {factor * found.noise_floor:.3g}."
+    )
+
+
+def _before_and_after(found: Diagnosis) -> list[str]:
+    parts = ["<h2>Error on held-out flights</h2>", f"<p>{held_out_error(found)}</p>"]
     if found.misfit:
         where = listed(f"{s:.0%} is {_PARTS[part]}" for part, s in found.misfit.items())
         parts.append(f"<p>Of the misfit of the textbook model, {where}.</p>")
@@ -198,8 +201,14 @@ def _parameters(found: Diagnosis) -> list[str]:
 
 
 def _limits(found: Diagnosis) -> list[str]:
+    effects = {
+        one.name: term.name
+        for term in library(extended=True)
+        for one in term.strengths()
+    }
     rows = [
         (
+            spelled(effects.get(name, "")),
             name,
             f"{one.value:.2g} {'' if one.unit == '-' else one.unit}".rstrip(),
             found.hides.get(name, "").replace("_", " "),
@@ -208,5 +217,10 @@ def _limits(found: Diagnosis) -> list[str]:
     ]
     if not rows:
         return []
-    headings = ("parameter", "smallest detectable strength", "mostly absorbed by")
-    return ["<h2>Detection limits</h2>", table_html(headings, rows, text=(0, 2))]
+    headings = (
+        "effect",
+        "parameter",
+        "smallest detectable strength",
+        "mostly absorbed by",
+    )
+    return ["<h2>Detection limits</h2>", table_html(headings, rows, text=(0, 1, 3))]

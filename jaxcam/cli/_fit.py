@@ -92,7 +92,7 @@ def fit(
             report("drawing", None)
             figures = draw(out, found.before, found.after)
     # the segmentation may add a note to a recording
-    notes = notes_of([*runs, *(part.recording for part in found.segments)])
+    notes = notes_of([*runs, *(part.recording for part in found.segments)], case)
     print_fit(output, found, notes)
     output.print_figures(figures)
     about = {"case": runs.name, "notes": list(notes), "figures": figures}

@@ -7,7 +7,6 @@ from html import escape
 from pathlib import Path
 
 from ..recordings.against_model import Row
-from ..tables import scaled
 from ._demo_branches import Branches, HEADINGS as HEADINGS_OF_BRANCHES
 from ._rests import HEADINGS, rest_rows, Rests
 
@@ -130,10 +129,8 @@ _MODES = ("mode", "ratio", "rms", "noise", "unit", "pieces", "most significant a
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    # choose the same unit as in the figures
-    factor, unit = scaled(row.unit, 4 * max(row.rms, row.noise))
-    sizes = (f"{factor * one:.2g}" for one in (row.rms, row.noise))
-    numbers = (f"{row.ratio:.2f}", *sizes)
+    rms, noise, unit = row.shown()
+    numbers = (f"{row.ratio:.2f}", rms, noise)
     place = f"{row.worst_record}, {row.worst_time:.3f} s"
     if row.worst_phase == row.worst_phase:
         place += f", cam at {row.worst_phase:.2f} rad"

@@ -1,7 +1,8 @@
 """Fit parameters to complete free runs, the criterion used in benchmarks."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import jax
@@ -51,6 +52,7 @@ def fit_free_run(
     *,
     start: Mapping[str, float] | None = None,
     samples: int = 20,
+    progress: Callable[[int, float], None] | None = None,
 ) -> FreeRunFit:
     """Fit parameters to complete free runs.
 
@@ -69,6 +71,8 @@ def fit_free_run(
         start: Initial values of some parameters; default: those of the model.
         samples: Number of samples from which the initial state of a recording is
             estimated.
+        progress: Called after each evaluation with its number and the cost (half the
+            sum of squared residuals, in units of the noise).
 
     Returns:
         A `FreeRunFit`.
@@ -109,14 +113,14 @@ def fit_free_run(
         for side in ("lower", "upper")
     )
     values = np.clip(values, low, high)
-    settled = False
+    settled, counted = False, itertools.count(1)
     for _ in range(_ROUNDS):
         ready = [
             (layout, prepared(layout.at(jnp.asarray(values)), run, samples))
             for layout, run in zip(layouts, runs)
         ]
         found = least_squares(
-            partial(_missed, ready),
+            _told(partial(_missed, ready), progress, counted),
             values,
             partial(_slopes, ready, scale),  # pyright: ignore
             bounds=(low, high),
@@ -141,6 +145,19 @@ def _missed(ready: Sequence[tuple[Layout, Prepared]], values):
     """Return the residuals of all recordings, in units of the noise."""
     parts = [_off(*one, jnp.asarray(values)) for one in ready]
     return _sound(np.concatenate(parts))
+
+
+def _told(missed, progress, counted):
+    """Report the number and the cost of each evaluation of the residuals."""
+    if progress is None:
+        return missed
+
+    def evaluated(values):
+        found = missed(values)
+        progress(next(counted), float(found @ found) / 2)
+        return found
+
+    return evaluated
 
 
 def _slopes(ready: Sequence[tuple[Layout, Prepared]], scale, values):

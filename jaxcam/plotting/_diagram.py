@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # colour and label of independent runs, of upward sweeps and of downward sweeps
 _WAYS = {0: (SECTION, ""), 1: (FLIGHT, "upwards"), -1: (IMPACT, "downwards")}
 COLOURS = (
-    "#0072B2", "#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
+    "#0072B2", "#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#D55E00", "#F0E442",
     "#8C8C8C", "#004D7A", "#A6D8F5", "#8A5F00", "#7FD1B9", "#7A3F62", "#F4B183",
 )  # fmt: skip
 """Okabe-Ito colours, followed by lighter colours for large numbers of items."""

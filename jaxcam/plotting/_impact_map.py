@@ -78,8 +78,13 @@ def impact_return_map(
         right.set_xscale("log")
         right.set_yscale("log")
     _draw(right, system, found.speed, found, "speed", speed_unit(system), None)
-    if np.ptp(found.constraint) if len(found.constraint) else False:
-        legend_above(right)
+    if len(np.unique(found.constraint)) > 1:
+        if axes is None:
+            # one legend for both panels, which stay of one size
+            handles, words = right.get_legend_handles_labels()
+            figure.legend(handles, words, ncols=3, loc="outside upper center")
+        else:
+            legend_above(right)
     return figure
 
 

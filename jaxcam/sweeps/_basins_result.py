@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from ..tables import ShortTable
 from ._grid import Grid
 from .blocks import SWEEP
 
@@ -93,6 +94,18 @@ class Basins:
         return found
 
     def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> ShortTable:
+        """Return a table of the attractors with the sizes of their basins."""
         shape = " x ".join(map(str, self.grid.shape))
-        parts = (f"{name} {share.share:.1%}" for name, share in self.shares.items())
-        return f"Basins({shape}: {', '.join(parts)})"
+        sentence = f"Basins of {len(self.names)} attractors, {shape} states."
+        headings = ("attractor", "fraction of states", "standard error")
+        rows = [
+            (name, f"{one.share:.1%}", f"{one.stderr:.1%}")
+            for name, one in self.shares.items()
+        ]
+        return ShortTable(sentence, headings, rows, ("attractor",))

@@ -3,6 +3,7 @@
 import numpy as np
 import xarray
 
+from ..tables import ShortTable
 from ._exponents import Exponents
 from .attractors import APERIODIC, label_names, Labels
 
@@ -58,5 +59,19 @@ class Chart:
         return found
 
     def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> ShortTable:
+        """Return a table of the labels, the most frequent one first."""
         one, other = self.parameters
-        return f"Chart({one}: {len(self.first)} values, {other}: {len(self.second)})"
+        names, counts = np.unique(self.labels, return_counts=True)
+        order = np.argsort(-counts, kind="stable")
+        sentence = (
+            f"Chart of {one} ({len(self.first)} values) and {other} "
+            f"({len(self.second)} values)."
+        )
+        rows = [(str(names[k]), f"{counts[k] / self.labels.size:.1%}") for k in order]
+        return ShortTable(sentence, ("motion", "fraction"), rows, ("motion",))

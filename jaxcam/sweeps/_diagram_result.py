@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from ..tables import ShortTable
 from .attractors import label_names, Labels
 
 
@@ -95,7 +96,25 @@ class Diagram:
         return found
 
     def __repr__(self) -> str:
-        points, starts, keep, _ = self.dataset["state"].shape
-        return (
-            f"Diagram({self.parameter}: {points} values, {starts} starts, {keep} kept)"
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> ShortTable:
+        """Return a table of the labels of the motions from the first start."""
+        points, starts, keep, _ = self.states.shape
+        sentence = (
+            f"Diagram of {self.parameter}: {points} values, {starts} "
+            f"{'start' if starts == 1 else 'starts'}, {keep} samples of each motion."
         )
+        headings = ("motion", f"lowest {self.parameter}", f"highest {self.parameter}")
+        ways = {1: "upwards", -1: "downwards", 0: ""}
+        swept = bool(np.any(self.direction != 0))
+        rows = [
+            (one.label, f"{one.low:.6g}", f"{one.high:.6g}", ways[one.direction])
+            for one in self.ranges()
+        ]
+        if not swept:
+            return ShortTable(sentence, headings, [r[:3] for r in rows], ("motion",))
+        return ShortTable(sentence, (*headings, "sweep"), rows, ("motion", "sweep"))

@@ -99,4 +99,6 @@ def series_figure(system: CamFollower, found: Sequence[SettledMotion]) -> Figure
         ax.axis("off")
     for ax in axes[-1]:
         ax.set_xlabel("time (s)")
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, words, ncols=2, loc="outside upper right")
     return figure

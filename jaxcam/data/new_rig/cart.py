@@ -13,6 +13,8 @@ class Cart(HybridSystem):
     # the components of the state, in the order used by the functions below
     state_names = ("position", "velocity")
     state_units = ("m", "m/s")
+    # the constraints, in the order of `gap` and `impact`
+    constraint_names = ("left stop", "right stop")
 
     # parameters; cart.toml contains their values and tolerances
     stiffness: float = 40.0  # stiffness of the spring divided by the mass (1/s^2)

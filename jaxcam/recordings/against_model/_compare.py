@@ -6,7 +6,7 @@ the residual shows the model discrepancy in each mode: in flight, in contact or 
 impacts.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -86,15 +86,24 @@ def compare(
     return Comparison(tuple(parts), tuple(notes))
 
 
-def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
+def compare_case(
+    rig: Rig,
+    case: Sequence[Segments],
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> Comparison:
     """Compare all recordings of a cam-follower with its nominal model.
 
     Args:
         rig: The model; `rig.replace(...)` changes its values.
         case: Segments from `segment_case`.
+        progress: Called with the completed fraction.
 
     Returns:
         A comparison.
+
+    Raises:
+        RecordingError: A recording was segmented without its drive.
     """
     found = []
     for segments in case:
@@ -105,6 +114,8 @@ def compare_case(rig: Rig, case: Sequence[Segments]) -> Comparison:
             )
         system = rig.system(segments.drive.speed, segments.drive.phase)
         found.append(compare(system, segments))
+        if progress is not None:
+            progress(len(found) / len(case))
     return merge(found)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from rich.table import Table
 
+from ...tables import scaled
 from .._units import without_unit
 
 
@@ -69,6 +70,13 @@ class Row:
     worst_score: float
     """Significance of that difference, in standard errors."""
 
+    def shown(self) -> tuple[str, str, str]:
+        """Return the residual and the noise as text, and the unit of both: that of the
+        figures.
+        """
+        factor, unit = scaled(self.unit, 4 * max(self.rms, self.noise))
+        return f"{factor * self.rms:.2g}", f"{factor * self.noise:.2g}", unit
+
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
@@ -114,12 +122,13 @@ class Comparison:
             table.add_column(heading, justify="right", no_wrap=True)
         table.add_column("most significant at")
         for row in self.rows:
+            rms, noise, unit = row.shown()
             table.add_row(
                 f"{row.mode} of {without_unit(row.channel)}" if several else row.mode,
-                row.unit,
+                unit,
                 str(row.count),
-                f"{row.rms:.1e}",
-                f"{row.noise:.1e}",
+                rms,
+                noise,
                 f"{row.ratio:.2f}",
                 _place(row).replace(" at ", "\n", 1),
             )
@@ -215,8 +224,8 @@ _PLACES = {
 def _words(row: Row) -> str:
     channel = f"the {without_unit(row.channel)}"
     start = _PLACES[row.mode].format(channel=channel, ratio=f"{row.ratio:.1f}")
-    size = f" ({row.rms:.1e} {row.unit}".rstrip()
-    size += f" rms over {row.count} {_plural(row)})"
+    rms, _, unit = row.shown()
+    size = f" ({rms} {unit}".rstrip() + f" rms over {row.count} {_plural(row)})"
     # pure noise also has a most significant place, which is not reported
     where = f", most clearly in {_place(row)}" if row.ratio > 1.15 else ""
     return start + size + where
