@@ -29,10 +29,10 @@ def _found(functions, cost, samples=1000, score=None, names=frozenset()):
         (1000.0, 990.0, False),
         # only the fit with all of them leaves noise
         (1500.0, 1000.0, True),
-        # far from the data, they must explain half of what remains
+        # if the fit is poor, they must explain half of what remains
         (100_000.0, 20_000.0, True),
         (100_000.0, 60_000.0, False),
-        # near the data, an imperfect form may leave as much
+        # if the fit is good, an imperfect form may leave as much
         (3000.0, 1900.0, False),
     ],
 )

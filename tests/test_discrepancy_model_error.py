@@ -1,4 +1,4 @@
-"""Models so far from the data that their errors are allowed for."""
+"""Models whose errors are so large that the diagnosis allows for them."""
 
 import dataclasses
 import math
@@ -13,8 +13,8 @@ from jaxcam.discrepancy._diagnose import _again
 from jaxcam.discrepancy.evidence._visited_states import visited_states
 from jaxcam.discrepancy.report import Reason
 from jaxcam.discrepancy.search import (
-    far_from_data,
     KeptTrials,
+    model_errors_dominate,
     system_question,
     Trials,
     with_model_error,
@@ -107,9 +107,9 @@ def test_noise_and_joints_are_as_large_as_the_errors(question):
     is another one."""
     policy = Policy()
     bare = fit(question.problem, free=question.rig)
-    assert far_from_data(bare, bare, policy)
+    assert model_errors_dominate(bare, bare, policy)
     # a term that leaves little of the misfit is named, however small the noise is
-    assert not far_from_data(
+    assert not model_errors_dominate(
         bare, dataclasses.replace(bare, cost=0.02 * bare.cost), policy
     )
     found = with_model_error(question, policy)

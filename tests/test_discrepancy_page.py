@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from jaxcam.cli import write_report
 from jaxcam.cli._diagnosis_figures import _maps, _unseen, draw
-from jaxcam.cli._diagnosis_page import _knock_offs, diagnosis_page
+from jaxcam.cli._diagnosis_page import _knockoffs, diagnosis_page
 from jaxcam.cli._output import to_text
 from jaxcam.cli._ranking_figure import ranking, two_lines
 from jaxcam.cli._shapes_figure import caption, shapes as draw_shapes
@@ -256,14 +256,14 @@ def test_a_long_label_has_two_lines():
     assert two_lines("sensor lag") == "sensor lag"
 
 
-def test_the_page_compares_an_unnamed_force_with_its_knock_offs(unchecked_types):
+def test_the_page_compares_an_unnamed_force_with_its_knockoffs(unchecked_types):
     """It gives their number and the share of the best one; a restitution has none."""
     grid = (np.linspace(0.0, 1.0, 3),)
     table = (grid, np.zeros(3), np.ones(3), "rad/s^2", "words", ("run1",))
-    force = MissingFunction("force", ("position",), *table, knock_offs=(19, 0.034))
+    force = MissingFunction("force", ("position",), *table, knockoffs=(19, 0.034))
     bounce = MissingFunction("restitution", ("speed",), *table)
-    assert force.to_json()["knock_offs"] == {"tried": 19, "best": 0.034}
-    assert bounce.to_json()["knock_offs"] is None
+    assert force.to_json()["knockoffs"] == {"tried": 19, "best": 0.034}
+    assert bounce.to_json()["knockoffs"] is None
     found = dataclasses.replace(_diagnosis("unknown", ()), missing=(force, bounce))
-    (says,) = _knock_offs(found)
+    (says,) = _knockoffs(found)
     assert "19 functions" in says and "3.4%" in says

@@ -155,7 +155,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_FIRST",
         "_SECOND",
         "GATE_PLACES",
-        # how the arguments of a knock-off are shifted
+        # how the arguments of a knockoff are shifted
         "_BLOCKS",
         "_SHIFTS",
         # when a constant and a slope of a function are those of the rig

@@ -46,9 +46,9 @@ def test_a_decoy_acts_in_the_reverse_order_of_time():
         np.testing.assert_array_equal(found[row, ~seen], forces[row, ~seen])
 
 
-def test_a_knock_off_acts_at_other_moments_of_its_recording():
+def test_a_knockoff_acts_at_other_moments_of_its_recording():
     """At least a tenth of the recording away, counted around its ends; padding is left
-    as it is, and two knock-offs differ."""
+    as it is, and two knockoffs differ."""
     exists = np.array([[True] * 40, [True, False] * 20])
     response = Response(*([None] * len(Response._fields)))._replace(exists=exists)
     forces = np.arange(2 * 40 * 5, dtype=float).reshape(2, 40, 5, 1)
@@ -65,10 +65,10 @@ def test_a_knock_off_acts_at_other_moments_of_its_recording():
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.99, True), (1.01, False)])
-def test_a_force_that_a_knock_off_equals_is_not_reported(
+def test_a_force_that_a_knockoff_equals_is_not_reported(
     share, kept, monkeypatch, unchecked_types
 ):
-    """The force is kept if the best knock-off explains less than the force, 99 %."""
+    """The force is kept if the best knockoff explains less than the force, 99 %."""
     compared = (Shuffled("flight time", ("time",), (share, 0.2)),)
     inclusion = SimpleNamespace(inclusion={"flight time": 1.0})
     monkeypatch.setattr(_unnamed, "needs", lambda *_, **__: inclusion)

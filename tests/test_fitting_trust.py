@@ -104,14 +104,14 @@ def test_states_to_begin_with_are_near_the_motion():
 
 
 def test_a_fit_far_above_the_noise_has_not_converged():
-    """A linear spring for a sine at 0.8 rad: every optimum is far from the data."""
+    """A linear spring for a sine at 0.8 rad: every optimum is a poor fit."""
     found = fitting.fit(problem_of(swinging(65), Swing(linear=True)))
     assert found.cost > 4 * found.problem.samples
     assert not found.converged
     doubts = [one.doubt for one in found.reasons]
-    assert fitting.Doubt.FAR_FROM_DATA in doubts
-    assert "far from the data" in found.message
-    assert found.to_json()["reasons"][0]["doubt"] in ("far_from_data", "no_optimum")
+    assert fitting.Doubt.POOR_FIT in doubts
+    assert "The fit is poor" in found.message
+    assert found.to_json()["reasons"][0]["doubt"] in ("poor_fit", "no_optimum")
 
 
 def test_what_a_fit_says_cannot_disagree_with_what_it_holds():

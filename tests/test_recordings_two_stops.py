@@ -165,7 +165,7 @@ def test_each_stop_has_its_own_restitution():
         free=[name for name in TRUTH if name != "r_right"],
     )
     assert not held.converged
-    assert fitting.Doubt.FAR_FROM_DATA in [one.doubt for one in held.reasons]
+    assert fitting.Doubt.POOR_FIT in [one.doubt for one in held.reasons]
 
 
 def test_surfaces_that_make_no_sense_are_refused():

@@ -91,21 +91,21 @@ def _effects(found: Diagnosis) -> list[str]:
     return [
         "<h2>Missing physics</h2>",
         table_html(headings, rows, text=(0, 1, 2)),
-        *_knock_offs(found),
+        *_knockoffs(found),
     ]
 
 
-def _knock_offs(found: Diagnosis) -> list[str]:
+def _knockoffs(found: Diagnosis) -> list[str]:
     """Compare each unnamed force with functions that take its arguments at other
     moments.
     """
     return [
         f"<p>The unnamed force ({escape(', '.join(one.arguments))}) was compared with "
-        f"{one.knock_offs[0]} functions of the same kind that take their arguments at "
+        f"{one.knockoffs[0]} functions of the same kind that take their arguments at "
         f"other moments of the recordings: the best of them explains "
-        f"{one.knock_offs[1]:.1%} of what the force explains.</p>"
+        f"{one.knockoffs[1]:.1%} of what the force explains.</p>"
         for one in found.missing
-        if one.knock_offs is not None
+        if one.knockoffs is not None
     ]
 
 

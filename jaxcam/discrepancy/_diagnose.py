@@ -21,9 +21,9 @@ from .report import Diagnosis, diagnosis_of
 from .search import (
     Candidates,
     Clock,
-    far_from_data,
     KeptTrials,
     Missing,
+    model_errors_dominate,
     Question,
     Report,
     rig_question,
@@ -251,7 +251,7 @@ def _answered(
         trials.attempt(best.names, best, policy.iterations)
         best = search.run()
     bare, rough = trials.known[frozenset()], None
-    far = far_from_data(bare.fit, best.fit, policy)
+    far = model_errors_dominate(bare.fit, best.fit, policy)
     # an odd recording is no missing physics: the diagnosis is repeated without it
     odd = odd_record(best.fit, policy) is not None
     if far and not odd:

@@ -6,12 +6,11 @@ error rate per term and the detection limit are derived from the data and the se
 """
 
 import dataclasses
-import math
 from collections.abc import Iterator
 
 from scipy.stats import norm
 
-from ._settings import bounds, decides, Group as Group, has_several, Setting, shows
+from ._settings import bounds, check, decides, Group as Group, Setting, shows
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -57,7 +56,8 @@ class Policy:
     )
     elsewhere: float = decides(
         0.5,
-        "another location is chosen if it leaves less than this fraction of a residual",
+        "another location is chosen if it reduces the squared residual above the noise "
+        "to less than this fraction",
     )
     corner_share: float = decides(
         3e-4,
@@ -66,24 +66,22 @@ class Policy:
     )
     separate_gain: float = decides(
         0.5,
-        "minimum fraction of the misfit that separate parameter values for each "
-        "recording must explain",
+        "minimum fraction of the squared residual above the noise that separate "
+        "parameter values for each recording must explain",
     )
     common_gain: float = decides(
         0.9,
         "minimum gain of a function common to all recordings, relative to that of "
         "separate parameter values",
     )
-    near_cost: float = decides(
-        4.0, "cost per sample below which a fit counts as near the data"
-    )
-    knock_offs: int = decides(
-        19, "number of knock-offs of a force; it must explain more than each of them"
+    near_cost: float = decides(4.0, "cost per sample above which a fit counts as poor")
+    knockoffs: int = decides(
+        19, "number of knockoffs of a force; it must explain more than each of them"
     )
     explains: float = decides(
         0.5,
-        "far from the data, maximum fraction of a smaller model's cost that a model "
-        "may leave",
+        "if the fit is poor: maximum cost of a model as a fraction of the cost of the "
+        "model that it extends",
     )
     distinct_information: float = decides(
         1e-8,
@@ -153,17 +151,18 @@ class Policy:
     )
     resolved: float = decides(
         0.03,
-        "in that case, the noise as a fraction of the residual of the textbook model "
-        "on single pieces of flight",
+        "in that case, the minimum noise, as a fraction of the rms residual of the "
+        "textbook model on single pieces of flight",
     )
 
     # settings that limit the search
     minutes: float = bounds(
-        20.0, "time limit (min, without other programs) for trying further candidates"
+        20.0,
+        "time limit in minutes for trying further candidates, measured as on an "
+        "otherwise idle machine",
     )
     named_time: float = bounds(
-        0.5,
-        "fraction of this time for named terms while the fits are far from the data",
+        0.5, "fraction of this time that named terms may use while all fits are poor"
     )
     quick_iterations: int = bounds(
         15, "maximum iterations in the first fit of a subset"
@@ -181,14 +180,17 @@ class Policy:
     )
     fitted_subsets: int = bounds(6, "number of subsets fitted at each size above one")
     lead_bic: float = bounds(
-        50.0, "difference in BIC up to which a subset or a form is followed further"
+        50.0, "difference in BIC up to which a further subset or form is tried"
     )
     helpful_cost: float = bounds(
-        0.7, "the search continues if a term reduces the cost below this fraction"
+        0.7,
+        "while the fit is poor, the search continues only if a term reduces the cost "
+        "to less than this fraction",
     )
     clear_gain: float = bounds(
         10.0,
-        "multiple of the required gain above which a loss of fit need not be accurate",
+        "if removing a term worsens the fit by more than this multiple of the required "
+        "gain, the loss is not computed accurately",
     )
     astray_shift: float = bounds(
         3.0,
@@ -217,12 +219,14 @@ class Policy:
         1, "use of elements with internal states; 0: never, 1: if needed, 2: always"
     )
     worthwhile: float = bounds(
-        0.1, "with model errors, fraction of the cost that an addition must explain"
+        0.1,
+        "if model errors are allowed for, fraction of the cost that a further function "
+        "must explain",
     )
     element_misfit: float = bounds(
         0.1,
-        "if model errors are allowed for, fraction of the misfit below which a "
-        "residual is not worth an element with an internal state",
+        "if model errors are allowed for, elements with an internal state are tried "
+        "only if the cost with functions exceeds this fraction of the textbook model's",
     )
     function_lengths: tuple[float, ...] = bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
@@ -236,16 +240,22 @@ class Policy:
     promising: float = bounds(
         0.5, "minimum gain of a free function that is fitted, relative to the largest"
     )
-    rivalling: float = bounds(0.9, "the same minimum if a function explains the data")
-    followed: int = bounds(
-        3, "maximum number of free functions, terms and forms fitted per stage"
+    rivalling: float = bounds(
+        0.9, "the same minimum once a function has explained the data"
     )
-    form_cost: float = bounds(1.25, "maximum cost of a form, relative to the curve's")
+    followed: int = bounds(
+        3, "maximum number of functions, terms, forms or locations tried per stage"
+    )
+    form_cost: float = bounds(
+        1.25, "maximum cost of a form, relative to that of the function it replaces"
+    )
     negligible_residual: float = bounds(
-        0.1, "fraction of the tolerated residual below which the search ends"
+        0.1,
+        "the search ends if the remaining excess cost is below this fraction of the "
+        "tolerated one",
     )
     prior_fits: int = bounds(
-        4, "maximum number of fits of a free function in which its prior must converge"
+        4, "maximum number of fits until the prior of a free function converges"
     )
     element_fits: int = bounds(
         12,
@@ -267,7 +277,7 @@ class Policy:
         "consecutive strengths, and their number",
     )
     cause_worse: float = bounds(
-        4.0, "multiple of the smallest misfit above which this series ends"
+        4.0, "multiple of the smallest misfit above which no further strength is tried"
     )
     cause_difference: float = bounds(1e-3, "relative step of the finite differences")
     cause_fits: int = bounds(40, "maximum number of evaluations in that fit")
@@ -307,7 +317,9 @@ class Policy:
         3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
     rival: float = shows(
-        30.0, "difference in BIC up to which the next recording separates alternatives"
+        30.0,
+        "the recommended recording separates alternatives whose BIC is larger by less "
+        "than this",
     )
     absent_errors: float = shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"
@@ -324,20 +336,7 @@ class Policy:
     alternatives: int = shows(8, "maximum number of alternatives listed")
 
     def __post_init__(self):
-        for name in ("false_alarms", "confidence", "explains", "form_error"):
-            value = getattr(self, name)
-            if not 0 < value < 1:
-                raise ValueError(
-                    f"Policy: `{name}` is {value!r}; give a number between 0 and 1."
-                )
-        for setting in self.settings():
-            least = -1 if setting.name in ("functions", "elements") else 0
-            low = min(setting.value) if has_several(setting.value) else setting.value
-            if not low > least or not math.isfinite(low):
-                raise ValueError(
-                    f"Policy: `{setting.name}` is {setting.value!r}; give positive "
-                    f"numbers."
-                )
+        check(self.settings())
 
     @property
     def beyond(self) -> float:

@@ -39,7 +39,7 @@ class Doubt(enum.Enum):
 
     NO_OPTIMUM = "the iteration ended before an optimum"
     NOT_FINITE = "a parameter, a state, a cost or an error is not a finite number"
-    FAR_FROM_DATA = "the cost is far above what the noise explains"
+    POOR_FIT = "the cost is far above what the noise explains"
     ON_A_BOUND = "a parameter is at a bound"
     NOT_CONSTRAINED = "the data do not constrain a parameter"
     TOO_MANY_EVENTS = "a piece of a recording contains more events than are located"
@@ -79,7 +79,7 @@ def not_finite(problem: Problem, point: Point, cost: float, costs: Costs) -> str
     return ""
 
 
-def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> str:
+def poor_fit(problem: Problem, costs: Costs, weights: Weights | None) -> str:
     """Return a sentence if the cost is far above the noise, otherwise an empty string.
 
     The test uses the upper quartile over the pieces, so that one bad recording among
@@ -115,7 +115,7 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         level = float(np.quantile(cost[rows], _USUAL))
         if not level <= most:
             return (
-                f"The fit is far from the data {place}: in the worst quarter of the "
+                f"The fit is poor {place}: in the worst quarter of the "
                 f"{measure} is at least {level:.3g} (noise alone gives 1); the model, "
                 "the initial values or the stated noise must be wrong."
             )
@@ -127,7 +127,7 @@ def far_from_data(problem: Problem, costs: Costs, weights: Weights | None) -> st
         r, k = np.unravel_index(np.argmax(total), total.shape)
         when = float(np.asarray(pieces.flown.start)[r, k])
         return (
-            f"The fit is far from the data: the cost per sample is {mean:.3g} (noise "
+            f"The fit is poor: the cost per sample is {mean:.3g} (noise "
             f"alone gives 1); it is largest in {problem.records[r]} near {when:.4g} s, "
             "so check the residuals there."
         )

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._descend import descend, Descent, Objective
-from ._doubts import far_from_data
+from ._doubts import poor_fit
 from ._fit_result import finish, Fit
 from .engine import (
     already_loose,
@@ -112,7 +112,7 @@ def fit(
 
 def _far(problem, found: Descent, weights) -> bool:
     costs = jax.device_get(found.costs)
-    return not np.isfinite(found.cost) or bool(far_from_data(problem, costs, weights))
+    return not np.isfinite(found.cost) or bool(poor_fit(problem, costs, weights))
 
 
 def _loose(objective: Objective) -> Objective:
@@ -121,7 +121,7 @@ def _loose(objective: Objective) -> Objective:
 
 
 def _other_starts(objective: Objective, point: Point, loosely: Callable[[], Point]):
-    """Yield other starting points for a fit that ended far from the data.
+    """Yield other starting points for a poor fit.
 
     Each is the result of a fit with loose joints, first from the given point, then with
     parameters multiplied by a few factors: the cost of an oscillation over many periods

@@ -12,9 +12,9 @@ from jaxtyping import Float
 from ..tables import ShortTable
 from ._doubts import (
     Doubt,
-    far_from_data,
     not_finite,
     on_a_bound,
+    poor_fit,
     Reason,
     too_many_events,
 )
@@ -132,8 +132,8 @@ class Fit:
         if wrong:
             found.append(Reason(Doubt.NOT_FINITE, wrong))
         else:
-            far = far_from_data(self.problem, self.costs, self.weights)
-            found += [Reason(Doubt.FAR_FROM_DATA, far)] if far else []
+            far = poor_fit(self.problem, self.costs, self.weights)
+            found += [Reason(Doubt.POOR_FIT, far)] if far else []
             many = too_many_events(self.problem, self.point, self.weights)
             found += [Reason(Doubt.TOO_MANY_EVENTS, many)] if many else []
         bounds = on_a_bound(self.problem, self.free, self.point)

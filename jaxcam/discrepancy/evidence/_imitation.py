@@ -1,6 +1,6 @@
 """Find named terms that only imitate what else is missing.
 
-Far from the data, the best of the known terms represents as much as it can of an
+If the fit is poor, the best of the known terms represents as much as it can of an
 unknown effect. Such a term is hardly needed once a free function for that effect is
 fitted as well.
 """

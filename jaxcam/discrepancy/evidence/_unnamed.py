@@ -30,7 +30,7 @@ class Unnamed(NamedTuple):
 
     `needs` are their bootstrap results, and `rivals` are other functions that were
     fitted in their place. `by_chance`: forces that are not reported, because a
-    knock-off explains as much.
+    knockoff explains as much.
     """
 
     found: Missing | None = None
@@ -142,7 +142,7 @@ def _needed(
     by_chance: list[Shuffled],
 ) -> tuple[Missing | None, Needs | None]:
     """Drop functions and terms that the bootstrap samples do not retain, and forces
-    that explain no more than their knock-offs, which are added to `by_chance`.
+    that explain no more than their knockoffs, which are added to `by_chance`.
 
     **Returns:** the fit with the others, and their bootstrap results; `None` for both
     if no function is left, or if the score of the fit is not below `bic`.

@@ -36,7 +36,7 @@ def whole_flights(
     """
     found = after
     for part in _PARTS:
-        # all joints at once would start too far from the data; the scale of looser
+        # all joints at once would start with too poor a fit; the scale of looser
         # joints than those of separate pieces is that of the joints themselves
         tight = allowing(after.problem.extras, part / max(looseness, 1.0))
         found = fit(

@@ -84,7 +84,7 @@ def rival_name(rival: Rival) -> str:
 def _why_not(rival: Rival, policy: Policy) -> str:
     found = rival.missing.fit
     if found.cost > policy.near_cost * found.problem.samples:
-        return "its fit did not come close to the data"
+        return "its fit is poor"
     return f"would be chosen in {rival.share:.0%} of the bootstrap samples"
 
 
@@ -145,7 +145,7 @@ def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
     """Return the reason why a fitted subset is not the named one."""
     best, samples = choice.named.best, trials.problem.samples
     if not trials.settled(trial):
-        return "its fit did not come close to the data"
+        return "its fit is poor"
     if abs(trial.bic - best.bic) < trials.policy.tie:
         return "explains as much: these recordings cannot distinguish between the two"
     if trial.bic < best.bic:

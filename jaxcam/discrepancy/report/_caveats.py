@@ -123,8 +123,8 @@ def noisier_than_stated(question: Question) -> Iterator[Caveat]:
 
 
 def model_errors(question: Question, choice: Choice) -> Iterator[Caveat]:
-    """Return caveats for a model that is so far from the data that its errors were
-    allowed for.
+    """Return caveats for a fit that is so poor that errors of the model were allowed
+    for.
     """
     whole, unit = choice.whole, question.unit
     errors = question.model_errors
@@ -133,8 +133,8 @@ def model_errors(question: Question, choice: Choice) -> Iterator[Caveat]:
         more = f", and deviations below {one.used:.3g} were treated as noise"
         yield Caveat(
             Reason.MODEL_ERROR,
-            "The model is far from the data: on single pieces of flight, the residual "
-            f"of the textbook model in `{one.channel}` is {one.residual:.3g}, "
+            "The errors of the model are large: on single pieces of flight, the "
+            f"residual of the textbook model in `{one.channel}` is {one.residual:.3g}, "
             f"{ratio(one.residual / one.stated)} times the noise ({one.stated:.3g}). "
             "The pieces of a flight were therefore allowed to join inexactly"
             f"{more if one.used > one.stated else ''}. All residuals of this report "
@@ -199,7 +199,7 @@ def small_remainder(choice: Choice, share: float) -> Caveat:
 def functions_fall_short(left: float) -> Caveat:
     """Return the caveat that unnamed functions leave a residual above the noise."""
     return Caveat(
-        Reason.FAR_FROM_DATA,
+        Reason.POOR_FIT,
         f"With these functions, the residual of the fit is still {ratio(left)} times "
         "the noise: they are only part of the missing physics, and their form is "
         "approximate.",
@@ -228,7 +228,7 @@ def decoy_explains(share: float) -> Caveat:
 
 
 def by_chance(one: Shuffled) -> Caveat:
-    """Return the caveat that a force explains no more than one of its knock-offs."""
+    """Return the caveat that a force explains no more than one of its knockoffs."""
     return Caveat(
         Reason.CHANCE,
         f"A force that depends on {listed(one.arguments)} fits the recordings, but of "
@@ -310,12 +310,12 @@ def _against(trials: Trials, share: float) -> str:
 
 
 def _far(trials: Trials) -> Caveat:
-    """Return the caveat that even the best fit is far from the data."""
+    """Return the caveat that even the best fit is poor."""
     least = min(trials.known.values(), key=lambda trial: trial.fit.cost)
     named = listed(sorted(least.names)) if least.names else "none of them"
     return Caveat(
-        Reason.FAR_FROM_DATA,
-        "No subset of the known effects comes close to these recordings: the residual "
+        Reason.POOR_FIT,
+        "No subset of the known effects fits these recordings well: the residual "
         f"of the best fit, with {named}, is {ratio(rms_of(least.fit))} times the "
         "noise. The stated form and location of the missing physics are approximate.",
         tuple(sorted(least.names)),

@@ -81,7 +81,7 @@ def degree_of(family: Family) -> int:
 def covariance_of(found: Fit, names: Sequence[str], policy: Policy):
     """Return the covariance of some parameters.
 
-    If the fit is far from the data, its own covariance may contain pieces whose
+    If the fit is poor, its own covariance may contain pieces whose
     derivatives diverge; these are left out here.
     """
     if found.cost < policy.near_cost * found.problem.samples:

@@ -75,7 +75,7 @@ class MissingFunction:
     - `words`: a description. `records`: the recordings that were searched for it.
     - `formula`: the formula of the value, if a parametric form explains as much.
     - `nearly`: otherwise the formula of the best form, if it is close.
-    - `knock_offs`: for a force, the number of knock-offs, which take its arguments at
+    - `knockoffs`: for a force, the number of knockoffs, which take its arguments at
         other moments, and the gain of the best of them as a fraction of its own.
     - `element`: for a force with an internal state, the element for a simulation.
     - `numbers`: for any other function, the names of its fitted parameters.
@@ -96,7 +96,7 @@ class MissingFunction:
     numbers: tuple[str, ...] = ()
     gap: str = ""
     nearly: str | None = None
-    knock_offs: tuple[int, float] | None = None
+    knockoffs: tuple[int, float] | None = None
 
     @property
     def slot(self) -> str:
@@ -113,8 +113,8 @@ class MissingFunction:
             "unit": self.unit,
             "formula": self.formula,
             "nearly": self.nearly,
-            "knock_offs": self.knock_offs
-            and dict(zip(("tried", "best"), self.knock_offs)),
+            "knockoffs": self.knockoffs
+            and dict(zip(("tried", "best"), self.knockoffs)),
             "gap": self.gap or None,
             "words": self.words,
             "records": list(self.records),
@@ -140,7 +140,7 @@ def missing_functions(
         if isinstance(one, Hidden)
         else dataclasses.replace(
             _one(missing.fit, one, velocities, positions, close.get(one.slot), policy),
-            knock_offs=compared.get(one.label),
+            knockoffs=compared.get(one.label),
         )
         for one in missing.functions
     )

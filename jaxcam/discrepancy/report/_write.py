@@ -216,8 +216,8 @@ def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[C
 
 
 def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Caveat]:
-    """Return caveats if the functions leave a residual, do not predict the held-out
-    data, or explain no more than other functions do.
+    """Return caveats if the functions leave a residual above the noise, do not predict
+    the held-out data, or explain no more than other functions do.
     """
     left, held = missing.fit, choice.held
     for rival in choice.unnamed.rivals:

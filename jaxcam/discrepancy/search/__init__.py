@@ -27,7 +27,7 @@ from ._kept_trials import KeptTrials as KeptTrials
 from ._leads import decoys_of as decoys_of
 from ._local_force import force_blocks as force_blocks, Response as Response
 from ._model_error import (
-    far_from_data as far_from_data,
+    model_errors_dominate as model_errors_dominate,
     with_model_error as with_model_error,
 )
 from ._named_terms import with_terms as with_terms

@@ -46,11 +46,11 @@ class ElementNeed:
     def remains(self, problem: Problem, found: Missing | None, least: float) -> bool:
         """Return whether an element may explain what functions leave.
 
-        If the fit with functions is far from the data, any element is predicted to
-        gain; it must then explain most of what remains.
+        If the fit with functions is poor, any element is predicted to gain; it must
+        then explain most of what remains.
 
-        **Arguments:** a fit with functions that leaves a residual, and the gain that an
-        element must add to it.
+        **Arguments:** a fit with functions that leaves a residual above the noise, and
+        the gain that an element must add to it.
         """
         if found is None:
             return self.comparable

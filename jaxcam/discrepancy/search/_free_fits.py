@@ -31,7 +31,7 @@ class Missing(NamedTuple):
         function).
     - `problem`: the problem with slots for the functions; that of `fit` contains their
       priors.
-    - `shuffled`: the gains of knock-offs of each force.
+    - `shuffled`: the gains of knockoffs of each force.
     - `decoys`: for each label, the predicted gain of a function of the same family that
       is reversed in time, as a fraction of the gain of the function itself.
     """
@@ -56,9 +56,9 @@ class Subset(NamedTuple):
 class FreeFits:
     """Fits of subsets with free functions.
 
-    While a model is far from the data, with a cost per sample of T, the log-likelihood
-    is divided by T, so that rig parameters do not leave their tolerances to compensate
-    for effects not yet found.
+    While a fit is poor, with a cost per sample of T, the log-likelihood is divided by
+    T, so that rig parameters do not leave their tolerances to compensate for effects
+    not yet found.
 
     **Arguments:** names of the rig parameters, candidate terms, policy.
     """

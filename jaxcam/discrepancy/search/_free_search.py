@@ -73,7 +73,7 @@ class FreeSearch:
         faults = own_faults(self.problem.model, self.problem.parameters)
         self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
         self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
-        # far from the data, the predicted gains of elements are not reliable, and the
+        # with model errors, the predicted gains of elements are not reliable, and the
         # pieces are hardly connected anyway
         self.roughly, self.apart = roughly, self.problem
         if not roughly:
@@ -137,8 +137,8 @@ class FreeSearch:
     def _lacks(self, found: Missing, whole: Missing) -> bool:
         """Return whether functions or terms that were left out of a fit are needed.
 
-        This is the case if only the fit with them leaves noise, or if the fit is far
-        from the data and they explain most of what remains.
+        This is the case if only the fit with them leaves nothing but noise, or if the
+        fit is poor and they explain most of what remains.
         """
         few, many = (len(one.functions) + len(one.names) for one in (found, whole))
         if few == many or leaves_noise(self.fits, found):
@@ -326,7 +326,7 @@ class FreeSearch:
     def _swapped(self, found: Missing) -> Missing:
         """Replace earlier functions by terms that explain more.
 
-        A function found while the fit is far from the data may represent two effects.
+        A function found while the fit is poor may represent two effects.
         """
         for out in (*found.functions, *sorted(found.names)):
             rest, point = self.left_out.subset(found, out)
@@ -345,7 +345,7 @@ class FreeSearch:
         return found
 
     def shuffled(self, found: Missing, seed: int) -> tuple[Shuffled, ...]:
-        """Return the gains of the knock-offs of all forces."""
+        """Return the gains of the knockoffs of all forces."""
         return shuffled(self.fits, self.apart, found, self.policy, seed)
 
     def without(self, found: Missing, label: str) -> Missing:

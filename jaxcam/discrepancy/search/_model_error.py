@@ -1,4 +1,4 @@
-"""Allow for the errors of a model that is far from the data.
+"""Allow for the errors of a model whose fit is very poor.
 
 If the residual is very large compared with the noise, the likelihood of the noise says
 nothing useful: it is dominated by the errors of the model, which accumulate along a
@@ -25,10 +25,10 @@ from ._question import ModelError, Question, with_noise
 _ROUNDS, _CONSISTENT = 12, 2.0
 
 
-def far_from_data(bare: Fit, best: Fit, policy: Policy) -> bool:
-    """Return whether a fit is so far from the data that model errors dominate.
+def model_errors_dominate(bare: Fit, best: Fit, policy: Policy) -> bool:
+    """Return whether a fit is so poor that model errors dominate the residual.
 
-    Named terms that explain nearly all of the misfit count, although what they leave
+    They do not if named terms explain nearly all of the misfit, although the remainder
     may be large compared with the noise.
 
     **Arguments:** the fits without terms and with the best ones; the policy.

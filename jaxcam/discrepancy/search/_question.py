@@ -52,8 +52,8 @@ class Question:
         `drive_noise`.
     - `shown`: parameters that are reported in another form.
     - `noisier`: channels with more noise than stated.
-    - `model_errors`: residuals of the channels, if the model is so far from the data
-        that its errors are allowed for.
+    - `model_errors`: residuals of the channels, if the fit is so poor that errors of
+        the model are allowed for.
     - `looseness`: in that case, error of a joint relative to that of the state of a
         single piece.
     - `location`: coordinate and gap on which missing physics acts.

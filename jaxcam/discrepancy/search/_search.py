@@ -22,8 +22,8 @@ class Search:
     def run(self) -> Trial:
         """Return the best subset; it is empty if no term is worth its parameters.
 
-        It is also empty if the best fit is far from the data and explains too little of
-        the misfit: the least-bad fit is not evidence.
+        It is also empty if the best fit is poor, has not converged and explains too
+        little of the misfit: being the best of several poor fits is not evidence.
         """
         bare = self.trials.attempt(frozenset(), None, self.policy.iterations)
         assert bare is not None
@@ -76,8 +76,8 @@ class Search:
     def _leads(self, before: Trial, best: Trial) -> bool:
         """Return whether to continue the search.
 
-        If the fit is far from the data, the search continues only if the added terms
-        have reduced the cost substantially.
+        If the fit is poor, the search continues only if the added terms have reduced
+        the cost substantially.
         """
         part = best.fit.cost / before.fit.cost
         return self.trials.settled(best) or part < self.policy.helpful_cost
@@ -85,8 +85,8 @@ class Search:
     def _late(self) -> bool:
         """Return whether to try no further subset.
 
-        Far from the data, time is left for unnamed functions, because the terms may not
-        contain the missing effect.
+        While the fit is poor, time is left for unnamed functions, because the terms may
+        not contain the missing effect.
         """
         near = self.policy.near_cost * self.trials.problem.samples
         far = self.trials.least_cost > near
@@ -234,9 +234,9 @@ class Search:
     def _least_of_vibrations(self, trial: Trial) -> float:
         """Return the predicted gain that a vibration must have to be fitted.
 
-        If the fit is far from the data, any missing physics has components at all
-        frequencies, and fits of a vibration take longest. A vibration must therefore
-        explain most of the residual.
+        If the fit is poor, any missing physics has components at all frequencies, and
+        fits of a vibration take longest. A vibration must therefore reduce the excess
+        cost substantially.
         """
         samples = self.trials.problem.samples
         if trial.fit.cost < self.policy.near_cost * samples:

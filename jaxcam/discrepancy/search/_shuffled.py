@@ -1,6 +1,6 @@
-"""Knock-off forces, which bound the rate at which forces are found by chance.
+"""Knockoff forces, which bound the rate at which forces are found by chance.
 
-A knock-off has the same functions as a force that was found, but takes their arguments
+A knockoff has the same functions as a force that was found, but takes their arguments
 at other moments of the same recording. It cannot be physics, so it explains only what
 as many coefficients explain by chance.
 """
@@ -29,7 +29,7 @@ _BLOCKS = 8
 
 
 class Shuffled(NamedTuple):
-    """The gains of knock-offs of a function, relative to that of the function itself,
+    """The gains of knockoffs of a function, relative to that of the function itself,
     the largest first.
     """
 
@@ -43,14 +43,14 @@ class Shuffled(NamedTuple):
 
     @property
     def by_chance(self) -> bool:
-        """Return whether a knock-off explains as much as the function."""
+        """Return whether a knockoff explains as much as the function."""
         return self.best >= 1.0
 
 
 def shuffled(
     fits: FreeFits, apart: Problem, found: Missing, policy: Policy, seed: int
 ) -> tuple[Shuffled, ...]:
-    """Return the gains of knock-offs of each force of a fit.
+    """Return the gains of knockoffs of each force of a fit.
 
     Forces that the recordings do not show to first order are left out.
 
@@ -73,7 +73,7 @@ def shuffled(
 def _shares(
     fits: FreeFits, problem: Problem, found: Missing, one: Free, policy: Policy, seed
 ) -> tuple[float, ...]:
-    """Return the gains of knock-offs of one force, with the others in place, as
+    """Return the gains of knockoffs of one force, with the others in place, as
     fractions of its own; none if its own is not positive.
     """
     heat, point = heat_of(found.fit), found.fit.point
@@ -93,10 +93,10 @@ def _shares(
     if not whole > 0:
         return ()
     rng = np.random.default_rng(seed)
-    knock_offs = (
-        _at_other_moments(response, forces, rng) for _ in range(policy.knock_offs)
+    knockoffs = (
+        _at_other_moments(response, forces, rng) for _ in range(policy.knockoffs)
     )
-    return tuple(sorted((gain(each) / whole for each in knock_offs), reverse=True))
+    return tuple(sorted((gain(each) / whole for each in knockoffs), reverse=True))
 
 
 def _functions(nodes: Nodes, found: Missing, one: Free) -> Float[np.ndarray, "r k l p"]:

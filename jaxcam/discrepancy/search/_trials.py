@@ -198,7 +198,7 @@ class Trials:
     def settled(self, trial: Trial) -> bool:
         """Return whether the quadratic model about a fit is valid.
 
-        It is valid at an optimum, and also elsewhere if the fit is near the data.
+        It is valid at an optimum, and also elsewhere if the fit is not poor.
         """
         close = trial.fit.cost < self.policy.near_cost * self.problem.samples
         return trial.fit.optimal or close
