@@ -82,8 +82,8 @@ class Following:
         typer.Option(
             metavar="A,B",
             help=(
-                "Initial guess for the orbit's state at time zero, such as 0.3,0. "
-                "Default: the orbit to which the motion converges."
+                "Initial guess for the orbit's state at time zero, such as 0.3,0; "
+                "default: the orbit to which the motion converges."
             ),
         ),
     ] = None

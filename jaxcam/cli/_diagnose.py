@@ -37,7 +37,7 @@ def diagnose(
         float | None,
         typer.Option(
             metavar="MIN",
-            help="Time (min) after which no further candidate is tried. Default: 20.",
+            help="Time (min) after which no further candidate is tried; default: 20.",
         ),
     ] = None,
     resume: Resume = False,
@@ -58,7 +58,7 @@ def diagnose(
     ] = None,
 ) -> None:
     """
-    Determine from recordings which physics a model lacks.
+    Determine from recordings what physics a model lacks.
 
     The rig is a cam-follower or any system defined in a Python file; see jaxcam
     new-rig.

@@ -102,8 +102,8 @@ class Starts:
         str | None,
         typer.Option(
             metavar="A,B",
-            help="Initial state; default: the start in the rig file, a state in "
-            "sustained contact, or rest.",
+            help="Initial state; default: the `start` state of the rig "
+            "file; without one, a state in sustained contact, or rest.",
         ),
     ] = None
     starts: Annotated[

@@ -21,7 +21,7 @@ class Files:
             metavar="NAMES",
             help="The names of all columns in order, with - for a column to skip "
             "(time_s,-,angle_rad); or new names for some columns, optionally with a "
-            "factor (Angle=angle_deg,Y1=height_m*-8e-4).",
+            "factor, such as Y1=height_m*-8e-4.",
         ),
     ] = None
     rate: Annotated[

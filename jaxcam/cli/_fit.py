@@ -25,7 +25,7 @@ def fit(
     ] = 0,
     iterations: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Maximum number of iterations. Default: 60."),
+        typer.Option(metavar="N", help="Maximum number of iterations; default: 60."),
     ] = None,
     json_file: Annotated[
         Path | None,

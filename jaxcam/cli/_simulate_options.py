@@ -18,9 +18,9 @@ class RunOptions:
         typer.Option(
             metavar="A,B",
             help="Initial state, such as 0.3,0, or the word 'release' for the release "
-            "point of a sticking orbit. Default: the start in the rig file; otherwise "
-            "release, or rest if there is no release point; 1,0 for the bouncing ball; "
-            "0,0.1,-2 for the triple integrator.",
+            "point of a sticking orbit; default: the `start` state of the rig file; "
+            "without one, release, or rest if there is no release point; 1,0 for the "
+            "bouncing ball; 0,0.1,-2 for the triple integrator.",
         ),
     ] = None
     t0: Annotated[float, typer.Option(metavar="S", help="Initial time (s).")] = 0.0

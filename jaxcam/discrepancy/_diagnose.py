@@ -53,7 +53,7 @@ def diagnose(
     keep: Path | None = None,
     policy: Policy = Policy(),
 ) -> Diagnosis:
-    """Determine from recordings which physics a model lacks.
+    """Determine from recordings what physics a model lacks.
 
     A diagnosis takes minutes; the notebooks contain an example. Terms of the library
     and unknown forces are sought at the first coordinate and the first gap, and unknown

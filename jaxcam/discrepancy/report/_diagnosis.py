@@ -107,7 +107,7 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """The result of [`jaxcam.discrepancy.diagnose`][]: which physics the model
+    """The result of [`jaxcam.discrepancy.diagnose`][]: what physics the model
     lacks.
     """
 
