@@ -30,7 +30,7 @@ def make_model(
     """Create a system with the parameters given on the command line.
 
     Raises:
-        ValueError: A name or value is invalid; the message states the remedy.
+        ValueError: A name or value is invalid; the message says how to fix it.
     """
     return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
 

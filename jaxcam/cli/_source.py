@@ -36,7 +36,7 @@ class Source:
         """Return the saved system, or the system of a Python file with nominal values.
 
         Raises:
-            ValueError: A file is invalid; the message gives its name and the remedy.
+            ValueError: A file is invalid; the message gives its name and says how to fix it.
         """
         from ..fitting import is_setup, read_setup
         from ..fitting.own_systems import stated_system, system_class
@@ -107,7 +107,7 @@ def make_system(
     """Create a system; `preset` and a speed in rpm apply to the cam-follower only.
 
     Raises:
-        ValueError: The options do not fit the system; the message states the remedy.
+        ValueError: The options do not fit the system; the message says how to fix it.
     """
     import equinox as eqx
     import jax.numpy as jnp

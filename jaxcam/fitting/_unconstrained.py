@@ -30,7 +30,7 @@ class Unconstrained:
     """
 
     def sentence(self) -> str:
-        """Return the combination, and the remedy, in words."""
+        """Return the combination, and how to determine it, in words."""
         if len(self.names) == 1:
             return (
                 f"The data do not constrain {self.names[0]}; fix it or give it a "

@@ -1,4 +1,4 @@
-"""Detect invalid input; each message states the remedy."""
+"""Detect invalid input; each message says how to fix it."""
 
 import equinox as eqx
 import jax

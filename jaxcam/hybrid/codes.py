@@ -33,7 +33,7 @@ class _ByCode(type(eqx.Enumeration)):
 
 
 class RESULTS(eqx.Enumeration, metaclass=_ByCode):
-    """Reasons why a run ended; each message states the remedy.
+    """Reasons why a run ended; each message says how to fix it.
 
     `RESULTS[trajectory.code]` is the message for a result code; 0 means success.
 

@@ -2,7 +2,7 @@
 
 
 class RecordingError(ValueError):
-    """A file cannot be used as a recording; the message states the remedy.
+    """A file cannot be used as a recording; the message says how to fix it.
 
     Examples:
         >>> from jaxcam.recordings import RecordingError, read_recording
@@ -15,7 +15,7 @@ class RecordingError(ValueError):
 
 
 class RigError(ValueError):
-    """A rig file cannot be used; the message states the remedy.
+    """A rig file cannot be used; the message says how to fix it.
 
     Examples:
         >>> from jaxcam.recordings import RigError, read_rig

@@ -67,7 +67,7 @@ def basins(
         A [`jaxcam.sweeps.Basins`][].
 
     Raises:
-        ValueError: An argument is invalid; the message states the remedy.
+        ValueError: An argument is invalid; the message says how to fix it.
         RuntimeError: Workers were lost.
 
     Examples:

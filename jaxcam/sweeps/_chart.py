@@ -76,7 +76,7 @@ def chart(
         A [`jaxcam.sweeps.Chart`][].
 
     Raises:
-        ValueError: An argument is invalid; the message states the remedy.
+        ValueError: An argument is invalid; the message says how to fix it.
         RuntimeError: Workers were lost.
 
     Examples:

@@ -67,7 +67,7 @@ def diagram(
         A [`jaxcam.sweeps.Diagram`][].
 
     Raises:
-        ValueError: An argument is invalid; the message states the remedy.
+        ValueError: An argument is invalid; the message says how to fix it.
         RuntimeError: Workers were lost.
 
     Examples:

@@ -32,7 +32,7 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
         The class.
 
     Raises:
-        RigError: The class cannot be loaded; the message gives the file and the remedy.
+        RigError: The class cannot be loaded; the message gives the file and a fix.
     """
     path, name = split_name(named)
     file = Path(folder) / path

@@ -47,7 +47,7 @@ def read_columns(
     **Arguments:** `needed` are the required channels (SI names); with `only`, no others
     are read.
 
-    **Raises:** `RecordingError`, which states the remedy.
+    **Raises:** `RecordingError`, which says how to fix it.
     """
     source, mapping = _opened(file, columns)
     picks = [(name, *mapping.get(name, (name, 1.0))) for name in source.columns]

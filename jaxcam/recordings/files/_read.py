@@ -62,7 +62,7 @@ def read_recordings(
         A tuple of `Recording`, one for each run and piece.
 
     Raises:
-        RecordingError: The file cannot be used; the message states the remedy.
+        RecordingError: The file cannot be used; the message says how to fix it.
     """
     file = Path(file)
     chosen = read_columns(
@@ -117,7 +117,7 @@ def read_recording(
         A [`jaxcam.recordings.Recording`][].
 
     Raises:
-        RecordingError: The file cannot be used; the message states the remedy.
+        RecordingError: The file cannot be used; the message says how to fix it.
 
     Examples:
         >>> from pathlib import Path
@@ -163,7 +163,7 @@ def read_case(
         A case.
 
     Raises:
-        RecordingError: A file cannot be used; the message states the remedy.
+        RecordingError: A file cannot be used; the message says how to fix it.
 
     Examples:
         >>> from jaxcam.data import DEMO_RIG

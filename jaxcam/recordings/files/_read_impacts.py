@@ -46,7 +46,7 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
 
     Raises:
         RecordingError: The file cannot be used; the message gives the row and the
-            remedy.
+            how to fix it.
 
     Examples:
         >>> from pathlib import Path

@@ -56,7 +56,7 @@ class Source:
     def numbers(self, name: str, missing: bool = False) -> Float[np.ndarray, " k"]:
         """Return a column as numbers; with `missing`, an empty cell becomes NaN.
 
-        **Raises:** `RecordingError` that gives the row and the remedy.
+        **Raises:** `RecordingError`, which gives the row and says how to fix it.
         """
         column = self.columns[name]
         text = column.dtype.kind not in "fiub"
