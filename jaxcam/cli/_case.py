@@ -17,7 +17,7 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
         A `Case`, and a `Rig` or a `Setup`.
 
     Raises:
-        ValueError: A file is invalid; the message gives its name and says how to fix it.
+        ValueError: A file is invalid; the message names it and says how to fix it.
     """
     from ..fitting import is_setup, read_setup
     from ..recordings import read_rig

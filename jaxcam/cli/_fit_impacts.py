@@ -19,7 +19,7 @@ def fit_impacts(case: Path, files: Files, json_file: Path | None) -> None:
     """Print the restitution laws fitted to the impacts, and write them to a JSON file.
 
     Raises:
-        ValueError: The table is invalid; the message gives the row and says how to fix it.
+        ValueError: The table is invalid; the message names the row and a fix.
     """
     from ..fitting import impact_law
     from ..recordings import read_impacts

@@ -36,7 +36,7 @@ class Source:
         """Return the saved system, or the system of a Python file with nominal values.
 
         Raises:
-            ValueError: A file is invalid; the message gives its name and says how to fix it.
+            ValueError: A file is invalid; the message names it and says how to fix it.
         """
         from ..fitting import is_setup, read_setup
         from ..fitting.own_systems import stated_system, system_class

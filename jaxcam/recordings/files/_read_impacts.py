@@ -45,7 +45,7 @@ def read_impacts(file: str | Path, *, columns: Columns | None = None) -> ImpactT
         An [`jaxcam.recordings.ImpactTable`][].
 
     Raises:
-        RecordingError: The file cannot be used; the message gives the row and the
+        RecordingError: The file cannot be used; the message gives the row and says
             how to fix it.
 
     Examples:
