@@ -274,8 +274,8 @@ def report(found) -> None:
                 level_95 = scipy.stats.chi2.ppf(0.95, 1)
                 held = f"{np.mean([case.held[name] < level_95 for case in cases]):.0%}"
             print(
-                f"| {name} | {inside:.0%} | {bias:+.2f} +- {bias_error:.2f} | "
-                f"{np.std(z):.2f} | {rest:+.3f} +- {rest_error:.3f} | {held} |"
+                f"| {name} | {inside:.0%} | {bias:+.2f} ± {bias_error:.2f} | "
+                f"{np.std(z):.2f} | {rest:+.3f} ± {rest_error:.3f} | {held} |"
             )
         limit = scipy.stats.chi2.ppf(0.95, len(cases[0].off))
         together = np.mean([case.distance < limit for case in cases])

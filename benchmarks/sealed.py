@@ -80,7 +80,7 @@ def line(case: str, truth: dict, verdict: dict) -> str:
     if verdict["verdict"] == "unknown":
         named = "unknown"
     numbers = "; ".join(
-        f"{p} {true:.4g}, found {value:.4g} +- {stderr:.1g}"
+        f"{p} {true:.4g}, found {value:.4g} ± {stderr:.1g}"
         for p, true, value, stderr in strengths(truth, verdict)
     )
     mark = "yes" if right(truth, verdict) else "**no**"

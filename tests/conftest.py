@@ -42,7 +42,10 @@ def _cache_folder() -> Path:
     return folder
 
 
-jax.config.update("jax_compilation_cache_dir", str(_cache_folder()))
+_CACHE = str(_cache_folder())
+jax.config.update("jax_compilation_cache_dir", _CACHE)
+# also for the commands, which would set the user's folder, and for their processes
+os.environ["JAX_COMPILATION_CACHE_DIR"] = _CACHE
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
 

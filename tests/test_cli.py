@@ -34,12 +34,6 @@ from jaxcam.recordings import RecordingError
 BALL = "simulate bouncing-ball --set restitution=0.5 --state 2,0 --t1 3".split()
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    """A command sets the folder of compiled programs; here it is the tests' own."""
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 def jaxcam(*arguments, ok=True):
     found = CliRunner().invoke(app, [str(a) for a in arguments])
     if ok:
@@ -315,11 +309,9 @@ def test_compiled_programs_are_kept_where_the_user_says(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def demonstration(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo") / "report"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-        found = jaxcam(
-            "demo", "--no-diagnose", "--out", folder, "--json", folder / "again.json"
-        )
+    found = jaxcam(
+        "demo", "--no-diagnose", "--out", folder, "--json", folder / "again.json"
+    )
     return folder, found.stdout
 
 
@@ -368,7 +360,8 @@ def test_commands_on_the_page_of_the_demo_can_be_pasted(demonstration):
     folder, _ = demonstration
     page = (folder / "index.html").read_text(encoding="utf-8")
     commands = get_command(app).commands  # pyright: ignore
-    lines = re.findall(r"<pre>jaxcam (.*?)</pre>", page)
+    shown = re.findall(r"<pre>(.*?)</pre>", page)
+    lines = [re.sub("<.*?>", "", line).removeprefix("jaxcam ") for line in shown]
     # on to a system and a recording of one's own
     named = {line.split()[0] for line in lines}
     assert named == {"simulate", "continue", "new-rig", "diagnose", "demo"}

@@ -33,12 +33,6 @@ TRUTH = {
 pytestmark = pytest.mark.usefixtures("unchecked_types")
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    """A command sets the folder of compiled programs; here it is the tests' own."""
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 @pytest.fixture
 def rig(tmp_path, monkeypatch):
     """The example that new-rig writes, in a folder of its own."""

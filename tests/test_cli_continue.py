@@ -21,12 +21,6 @@ from jaxcam.cli._source import Source
 from jaxcam.data import NEW_RIG
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    """A command sets the folder of compiled programs; here it is the tests' own."""
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 def jaxcam(*arguments):
     return CliRunner().invoke(app, ["continue", *[str(a) for a in arguments]])
 

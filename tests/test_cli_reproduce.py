@@ -13,11 +13,6 @@ from jaxcam.thesis import TARGETS
 from jaxcam.thesis.target import Target
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 def jaxcam(*arguments):
     return CliRunner().invoke(app, ["reproduce", *map(str, arguments)])
 

@@ -6,11 +6,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.text import Text
+from PIL import Image
 
 from jaxcam.cli import write_report
 from jaxcam.cli._diagnosis_figures import _maps, _unseen, draw
 from jaxcam.cli._diagnosis_page import _knockoffs, diagnosis_page
 from jaxcam.cli._output import to_text
+from jaxcam.cli._page import prose
 from jaxcam.cli._ranking_figure import ranking, two_lines
 from jaxcam.cli._shapes_figure import caption, shapes as draw_shapes
 from jaxcam.discrepancy import Diagnosis, Verdict
@@ -123,7 +125,8 @@ EFFECT = Effect(
 @pytest.mark.usefixtures("unchecked_types")
 def test_the_page_is_complete(tmp_path, verdict, effects):
     found = _diagnosis(verdict, effects)
-    page = diagnosis_page(found, draw(tmp_path, found), ("A note.",))
+    figures = draw(tmp_path, found)
+    page = diagnosis_page(found, figures, ("A note.",))
     assert page.index("The model lacks damping.") < page.index("<figure>")
     assert "&lt;nothing&gt;" in page
     assert page.count("data:image/png;base64,") == 4
@@ -134,6 +137,11 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
     # a limit is that of an effect, and errors have the unit of the figures
     assert "<td class=text>Coulomb friction</td><td class=text>fc</td>" in page
     assert "is 0.2 mrad with the textbook model" in page
+    # letters are equally large in all figures: a picture is as wide as it was drawn
+    for file, _ in figures:
+        with Image.open(file) as image:
+            inches = image.width / image.info["dpi"][0]
+        assert f'<img width="{96 * inches:.0f}"' in page
     assert '"verdict"' in to_text(found.to_json())
 
 
@@ -267,3 +275,7 @@ def test_the_page_compares_an_unnamed_force_with_its_knockoffs(unchecked_types):
     found = dataclasses.replace(_diagnosis("unknown", ()), missing=(force, bounce))
     (says,) = _knockoffs(found)
     assert "19 functions" in says and "3.4%" in says
+
+
+def test_signs_and_powers_are_typeset_on_a_page():
+    assert prose("c = 2 +- 0.1 m/s^2 < 3") == "c = 2 ± 0.1 m/s<sup>2</sup> &lt; 3"

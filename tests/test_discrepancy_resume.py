@@ -52,9 +52,7 @@ def test_a_file_that_was_cut_off_is_passed_over(problem, tmp_path):
         assert kept.get(()) is None
 
 
-def test_what_an_interrupted_run_left_is_not_replaced(tmp_path, monkeypatch):
-    # a command sets the folder of compiled programs; here it is the tests' own
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
+def test_what_an_interrupted_run_left_is_not_replaced(tmp_path):
     (tmp_path / "fits").mkdir()
     (tmp_path / "fits" / "none.npz").write_bytes(b"something")
     line = ["diagnose", str(DEMO_RIG), "--out", str(tmp_path)]

@@ -16,12 +16,6 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("lines")
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    """A command sets the folder of compiled programs; here it is the tests' own."""
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 @FEW
 @given(line=hostile.lines())
 def test_any_line(folder, line):

@@ -21,12 +21,6 @@ from jaxcam.recordings.files import is_impact_table
 pytestmark = pytest.mark.usefixtures("unchecked_types")
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    """A command sets the folder of compiled programs; here it is the tests' own."""
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 def made(exponent, seed=0, count=24, noise=0.01, shared=False, **more):
     """Impacts of r = 0.8 (1 + v)^-b, each speed or each restitution with noise."""
     rng = np.random.default_rng(seed)

@@ -91,10 +91,8 @@ def test_what_it_says_wrongly(tmp_path, old, new, said):
     hostile_files.said(caught.value)
 
 
-def test_a_rig_of_a_cam_follower_names_columns_too(tmp_path, monkeypatch):
+def test_a_rig_of_a_cam_follower_names_columns_too(tmp_path):
     """A recording is refused for the angle in it, and not for the name of that."""
-    # a command sets the folder of compiled programs; here it is the tests' own
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
     folder = tmp_path / "case"
     shutil.copytree(DEMO_RIG, folder)
     rig = folder / "rig.toml"

@@ -14,11 +14,6 @@ def calibrated():
     return preset("calibrated")
 
 
-@pytest.fixture(autouse=True)
-def keep_the_cache_of_the_tests(monkeypatch):
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "as the tests have it")
-
-
 def differences(name, system):
     table = reproduce(name, system)
     return table.set_index("quantity")["difference"].dropna()

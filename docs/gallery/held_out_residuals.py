@@ -17,7 +17,7 @@ found = diagnose(rig, segment_case(read_case(DEMO_RIG), rig))
 print(found)
 
 with style():
-    figure, panels = plt.subplots(2, 1, figsize=(8.5, 4.6), sharex=True, sharey=True)
+    figure, panels = plt.subplots(2, 1, figsize=(6.4, 4.0), sharex=True, sharey=True)
     words = "textbook model", "with the friction that was identified"
     for ax, parts, word in zip(panels, found.unseen, words, strict=True):
         # one part for each fit that left some sections out

@@ -86,7 +86,7 @@ def _unseen(plt, found: Diagnosis):
     figure, axes = plt.subplots(
         rows,
         1,
-        figsize=(8.5, 0.6 + 2.0 * rows),
+        figsize=(6.8, 0.6 + 1.8 * rows),
         sharex=True,
         sharey=True,
         layout="constrained",
@@ -132,7 +132,7 @@ def _maps(plt, found: Diagnosis):
     figure, axes = plt.subplots(
         len(shown),
         len(sets),
-        figsize=(8.5, 0.6 + 2.2 * len(shown)),
+        figsize=(6.8, 0.6 + 1.9 * len(shown)),
         sharex=True,
         sharey=True,
         layout="constrained",

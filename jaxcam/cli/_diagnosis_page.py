@@ -9,7 +9,7 @@ from ..discrepancy.report import listed, number, spelled
 from ..tables import scaled
 from ._changed import changed
 from ._outlook import Outlook
-from ._page import figure_html, sentences, STYLE, table_html
+from ._page import figure_html, prose, sentences, STYLE, table_html
 from ._residual_axes import REACH
 
 
@@ -26,8 +26,8 @@ def diagnosis_page(
     title = f"{found.case or 'Recordings'}: {_title(found)}"
     parts = [
         f"<h1>{escape(title)}</h1>",
-        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(found.summary)),
-        *(f'<p class="note">{escape(note)}</p>' for note in notes),
+        *(f'<p class="sentence">{prose(s)}</p>' for s in sentences(found.summary)),
+        *(f'<p class="note">{prose(note)}</p>' for note in notes),
         *_effects(found),
         *_before_and_after(found),
         *(figure_html(file, caption) for file, caption in figures),
@@ -38,7 +38,7 @@ def diagnosis_page(
         parts += [
             f"<h2>{one.title}</h2>",
             table_html(one.headings, one.rows, text=(0,)),
-            f'<p class="note">{one.note}</p>',
+            f'<p class="note">{prose(one.note)}</p>',
         ]
     parts += [*_left_over(found), *_parameters(found), *_limits(found)]
     return (
@@ -123,7 +123,10 @@ def held_out_error(found: Diagnosis) -> str:
 
 
 def _before_and_after(found: Diagnosis) -> list[str]:
-    parts = ["<h2>Error on held-out flights</h2>", f"<p>{held_out_error(found)}</p>"]
+    parts = [
+        "<h2>Error on held-out flights</h2>",
+        f"<p>{prose(held_out_error(found))}</p>",
+    ]
     if found.misfit:
         where = listed(f"{s:.0%} is {_PARTS[part]}" for part, s in found.misfit.items())
         parts.append(f"<p>Of the misfit of the textbook model, {where}.</p>")
@@ -133,7 +136,7 @@ def _before_and_after(found: Diagnosis) -> list[str]:
 def _caveats(found: Diagnosis) -> list[str]:
     if not found.caveats:
         return []
-    items = "".join(f"<li>{escape(caveat.sentence)}</li>" for caveat in found.caveats)
+    items = "".join(f"<li>{prose(caveat.sentence)}</li>" for caveat in found.caveats)
     return ["<h2>Caveats</h2>", f"<ul>{items}</ul>"]
 
 

@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import re
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -28,15 +29,19 @@ class Report:
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --quiet: #57606a;
-  --line: #d0d7de; --shade: #f3f5f7; }
+  --line: #d0d7de; --shade: #f3f5f7; --link: #0063a0; }
 @media (prefers-color-scheme: dark) {
   :root { --ink: #e6e9ed; --paper: #14181d; --quiet: #9aa5b1; --line: #39424d;
-    --shade: #1f252c; } }
+    --shade: #1f252c; --link: #6cb6e8; }
+  /* figures are drawn on white: exchange light and dark, keep the hues, and let what
+     was white show the page */
+  img { filter: invert(1) hue-rotate(180deg); mix-blend-mode: screen; opacity: .92; } }
 * { box-sizing: border-box; }
 body { margin: 0 auto; max-width: 56rem; padding: 1.2rem 1rem 4rem; color: var(--ink);
   background: var(--paper); font: 1rem/1.55 system-ui, sans-serif; }
 h1 { font-size: 1.5rem; line-height: 1.25; }
 h2 { font-size: 1.15rem; margin-top: 2.4rem; }
+a { color: var(--link); }
 .sentence { font-size: 1.1rem; border-left: 4px solid #0072b2; padding-left: .9rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
@@ -45,15 +50,26 @@ th, td { padding: .4rem .6rem; text-align: right; white-space: nowrap;
 th { color: var(--quiet); font-weight: 600; white-space: normal; }
 .text { text-align: left; }
 td.text:last-child { white-space: normal; min-width: 18rem; }
-@media (max-width: 34rem) { table { font-size: .8rem; }
-  th, td { padding: .35rem .25rem; white-space: normal; }
-  td.text:last-child { min-width: 0; } }
-figure { margin: 1.4rem 0; }
-img { display: block; width: 100%; max-width: 46rem; height: auto; background: #fff;
-  border-radius: 6px; border: 1px solid var(--line); }
+figure { margin: 1.8rem 0; }
+img { display: block; max-width: 100%; height: auto; }
 figcaption, .note { color: var(--quiet); font-size: .92rem; margin-top: .4rem; }
+figcaption { max-width: 46rem; }
+sup { line-height: 0; }
 pre { background: var(--shade); padding: .7rem .9rem; border-radius: 6px;
   white-space: pre-wrap; overflow-wrap: anywhere; margin: .9rem 0 .2rem; }
+/* a line of a command ends between words, never at the hyphens of an option */
+pre span { display: inline-block; max-width: 100%; }
+@media (max-width: 34rem) {
+  table { font-size: .8rem; }
+  th, td { padding: .35rem .25rem; white-space: normal; }
+  td.text:last-child { min-width: 0; }
+  /* a row with many cells becomes a list of its cells, each with its heading */
+  .many thead, .many td:empty { display: none; }
+  .many tr { display: block; padding: .5rem 0; border-bottom: 1px solid var(--line); }
+  .many td { display: flex; justify-content: space-between; gap: 1.2rem; border: 0;
+    padding: .1rem 0; font-size: .9rem; text-align: right; }
+  .many td::before { content: attr(data-of); color: var(--quiet); text-align: left; }
+  .many td:first-child { font-weight: 600; } }
 """
 
 
@@ -63,7 +79,7 @@ def _lacks(summary: str | None) -> list[str]:
         return []
     return [
         "<h2>Model discrepancy</h2>",
-        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(summary)),
+        *(f'<p class="sentence">{prose(s)}</p>' for s in sentences(summary)),
         '<p class="note"><a href="diagnosis/index.html">Details of the diagnosis</a>: '
         "the fits without and with the missing effects, other explanations, and "
         "detection limits."
@@ -89,7 +105,7 @@ def page(report: Report) -> str:
         *_lacks(report.lacks),
         "<h2>Recording and simulation</h2>",
         # one statement per line is easier to read than a paragraph of numbers
-        *(f'<p class="sentence">{escape(s)}</p>' for s in sentences(report.sentence)),
+        *(f'<p class="sentence">{prose(s)}</p>' for s in sentences(report.sentence)),
         *_branches(report.branches),
         "<h2>Residuals by mode</h2>",
         table_html(_MODES, [_cells(row) for row in report.comparison], text=(0, 6)),
@@ -113,7 +129,7 @@ def page(report: Report) -> str:
         f"<ul>{''.join(f'<li>{escape(run)}</li>' for run in report.runs)}</ul>",
         "<h2>Next: your own system, your own recording</h2>",
         *(
-            f'<pre>{escape(command)}</pre><p class="note">{escape(purpose)}</p>'
+            f'<pre>{_words(command)}</pre><p class="note">{escape(purpose)}</p>'
             for command, purpose in report.next_steps
         ),
     ]
@@ -137,28 +153,60 @@ def _cells(row: Row) -> tuple[str, ...]:
     return (row.mode, *numbers, unit, str(row.count), place)
 
 
+# more columns than this do not fit a telephone
+_FEW = 5
+
+
 def table_html(
     headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int]
 ) -> str:
+    many = len(headings) > _FEW
+
     def line(tag: str, cells: Sequence[str]) -> str:
         marked = (
-            f"<{tag}{' class=text' if k in text else ''}>{escape(cell)}</{tag}>"
+            f"<{tag}{' class=text' if k in text else ''}"
+            f"{_heading(headings[k]) if many and tag == 'td' else ''}>"
+            f"{prose(cell)}</{tag}>"
             for k, cell in enumerate(cells)
         )
         return f"<tr>{''.join(marked)}</tr>"
 
     body = "".join(line("td", row) for row in rows)
     head = f"<thead>{line('th', headings)}</thead>"
-    return f'<div class="wide"><table>{head}<tbody>{body}</tbody></table></div>'
+    kind = "wide many" if many else "wide"
+    return f'<div class="{kind}"><table>{head}<tbody>{body}</tbody></table></div>'
+
+
+def _heading(text: str) -> str:
+    return f' data-of="{escape(text)}"'
+
+
+# at this size, letters of figures are as large as those of captions
+_CSS_PIXELS = 96
 
 
 def figure_html(file: Path, caption: str) -> str:
-    data = base64.b64encode(file.read_bytes()).decode("ascii")
-    caption = escape(caption)
+    from PIL import Image
+
+    content = file.read_bytes()
+    data = base64.b64encode(content).decode("ascii")
+    with Image.open(file) as image:
+        width = round(image.width / image.info["dpi"][0] * _CSS_PIXELS)
     return (
-        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
-        f"<figcaption>{caption}</figcaption></figure>"
+        f'<figure><img width="{width}" alt="{escape(caption)}" '
+        f'src="data:image/png;base64,{data}">'
+        f"<figcaption>{prose(caption)}</figcaption></figure>"
     )
+
+
+def prose(text: str) -> str:
+    """Return a text as HTML, with signs and powers typeset."""
+    return re.sub(r"\^(-?\d+)", r"<sup>\1</sup>", escape(text).replace("+-", "±"))
+
+
+def _words(command: str) -> str:
+    """Return a command as HTML in which each word is an element."""
+    return " ".join(f"<span>{escape(word)}</span>" for word in command.split(" "))
 
 
 def sentences(sentence: str) -> list[str]:

@@ -15,7 +15,7 @@ RANKING = (
     "the grey band are too small to distinguish explanations."
 )
 # maximum length of a line of a label and of a reason (characters)
-_LABEL, _REASON = 42, 34
+_LABEL, _REASON = 42, 30
 
 
 def ranking(plt, found: Diagnosis):
@@ -25,7 +25,7 @@ def ranking(plt, found: Diagnosis):
     names = [two_lines(spelled(one.name)) for one in ranked]
     deltas = [one.delta_bic for one in ranked]
     rows = len(ranked) + sum(name.count("\n") for name in names) / 2
-    figure, axis = plt.subplots(figsize=(9, 0.46 * rows + 1.3), layout="constrained")
+    figure, axis = plt.subplots(figsize=(8, 0.44 * rows + 1.3), layout="constrained")
     tie = found.policy.tie
     axis.set_xscale("symlog", linthresh=tie, linscale=0.5)
     axis.axvspan(-tie, tie, color="0.9", lw=0)
