@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from jaxcam.hybrid import stroboscope
-from jaxcam.models import ImpactOscillator, preset, rpm_to_rad_s
+from jaxcam.models import (
+    DryFrictionOscillator,
+    ImpactOscillator,
+    preset,
+    rpm_to_rad_s,
+)
 from jaxcam.sweeps import (
     basins,
     chart,
@@ -50,6 +55,14 @@ def test_two_attractors_coexist(coexisting):
     # one turn leads from each point of it to the next one
     moved = SECTION.sample(orbit[:6], 1, 1).final
     assert np.abs(moved - np.roll(orbit[:6], -1, axis=0)).max() < 1e-6
+
+
+def test_a_system_without_constraints_has_basins():
+    """A dry-friction oscillator has no gaps; all states reach its one orbit."""
+    oscillator = DryFrictionOscillator(omega=0.5, friction=0.6)
+    found = basins(oscillator, Grid((-2, -2), (2, 2), (4, 4)), turns=100)
+    assert found.names == ["P(0,1)"]
+    assert np.array_equal(found.attractor, np.zeros((4, 4)))
 
 
 def test_p11_is_the_orbit_in_closed_form(coexisting):

@@ -56,7 +56,8 @@ def chunk_rows(width: int) -> int:
 def smallest_gaps(
     system: HybridSystem, t0, states, where=None, values=None, room: float = 0.0
 ):
-    """Return the smallest gap of each state at `t0`, shape `(motions,)`.
+    """Return the smallest gap of each state at `t0`, shape `(motions,)`; infinite for a
+    system without constraints.
 
     Each gap is increased by `room` times its resolution.
     """
@@ -227,7 +228,8 @@ def _rows(states):
 @program
 def _gaps(batched, shared, t0, states, room):
     def one(batched, state):
-        return jnp.min(least_gaps(eqx.combine(batched, shared), t0, state, room))
+        found = least_gaps(eqx.combine(batched, shared), t0, state, room)
+        return jnp.min(found, initial=jnp.inf)
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0), 0))(batched, states)
 
