@@ -10,10 +10,11 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from scipy.stats import chi2, norm
 
 from ...fitting import Fit, Problem, residuals
+from ...hybrid.programs import program
 from ...recordings import References
 from ..policy import Policy
 from ..search import (
@@ -249,7 +250,7 @@ def _function(
     grid = grid[seen.near(term.variable, grid, policy)]
     if not len(grid):
         return {}
-    basis = np.asarray(jax.vmap(term.basis)(grid))
+    basis = np.asarray(_basis(term, grid))
     spread = basis * scale
     error = np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", spread, covariance, spread), 0))
     return {
@@ -261,6 +262,11 @@ def _function(
         "value": basis @ coefficients,
         "stderr": error,
     }
+
+
+@program
+def _basis(term: Shape, grid) -> Float[Array, "k p"]:
+    return jax.vmap(term.basis)(grid)
 
 
 def _vibration(

@@ -65,7 +65,8 @@ class Response(NamedTuple):
         for the parameters and `l` for the force at the nodes.
     - `place` `(r, m)`: for each parameter of a recording, its index among the `g` free
       parameters.
-    - `time` `(r, k, l)`: times of the nodes. `exists` `(r, k)`: false where padded.
+    - `motion`: motion at the nodes, `(r, k, l)` each. `exists` `(r, k)`: false where
+        padded.
     - `names`, `scale`, `prior`, `pull`, `owner` `(g,)`: names and scales of the free
         parameters, the contributions of their tolerances to the information and the
         score, and the recording to which they belong.
@@ -75,13 +76,18 @@ class Response(NamedTuple):
     free: tuple[str, ...]
     pieces: LinearPieces
     place: Int[np.ndarray, "r m"]
-    time: Float[np.ndarray, "r k l"]
+    motion: Motion
     exists: Bool[np.ndarray, "r k"]
     names: tuple[str, ...]
     scale: Float[np.ndarray, " g"]
     prior: Float[np.ndarray, " g"]
     pull: Float[np.ndarray, " g"]
     owner: Int[np.ndarray, " g"]
+
+    @property
+    def time(self) -> Float[np.ndarray, "r k l"]:
+        """Times of the nodes."""
+        return self.motion.t
 
 
 def stride_of(problem: Problem) -> int:
@@ -114,15 +120,15 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
 
     args = problem.layout, of_record((point.values, every), 0), nodes, stride, shown
     found = each_record(record, len(columns.place), (_linear, args))
-    part = problem.pieces.flown
-    half = stride * np.asarray(part.step)[..., None] / 2
+    moved = _motion(problem.layout, problem.pieces, point)
+    at_nodes = jax.tree.map(lambda part: np.asarray(part)[:, :, ::stride], moved)
     prior = prior_information(problem, columns, True)
     return Response(
         point,
         tuple(free),
         jax.tree.map(np.asarray, found),
         columns.place,
-        np.asarray(part.start)[..., None] + half * np.arange(nodes),
+        at_nodes,
         np.asarray(problem.pieces.exists),
         tuple(problem.names[p] for p in columns.parameter),
         columns.scale,
@@ -212,9 +218,7 @@ def forces_at_nodes(
     """Return the acceleration per unit of each strength of the given terms, at every
     node.
     """
-    terms = tuple(terms)
-    every = _forces(problem.layout, problem.pieces, response.point, terms)
-    return np.asarray(every)[:, :, :: stride_of(problem)]
+    return np.asarray(_slopes(tuple(terms), response.motion))
 
 
 def _chained(
@@ -293,10 +297,8 @@ def _linear(
 
 
 @program
-def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
-    """Return the acceleration per unit of each strength, at the nodes of every
-    piece.
-    """
+def _motion(layout, pieces, point) -> Motion:
+    """Return the motion at the ends and the middle of every step of every piece."""
 
     def piece(model, state, start, step, drive):
         size = state.shape[0] - len(filtered_channels(model))
@@ -309,15 +311,20 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
             end, _ = runge_kutta(model, during, t[1], middle, step / 2)
             states = jnp.stack([x, middle, end])[:, :size]
 
-            def slopes(t, x):
-                return _slopes(terms, during(t), t, x)
+            def motion(t, x):
+                system = during(t)
+                return system.motion(t, x, field=system.base.vector_field(t, x))
 
-            return end, jax.vmap(slopes)(t, states)
+            return end, jax.vmap(motion)(t, states)
 
         numbers = jnp.arange(drive.angle.shape[0], dtype=float)
-        _, slopes = jax.lax.scan(advance, state, (numbers, drive))
-        inner = slopes[:, :2].reshape(-1, slopes.shape[-1])
-        return jnp.concatenate([inner, slopes[-1, 2:]])
+        _, found = jax.lax.scan(advance, state, (numbers, drive))
+
+        def in_order(part):
+            inner = part[:, :2].reshape(-1, *part.shape[2:])
+            return jnp.concatenate([inner, part[-1:, 2]])
+
+        return jax.tree.map(in_order, found)
 
     def record(pieces, values, states):
         model = layout.at(values)
@@ -328,14 +335,17 @@ def _forces(layout, pieces, point, terms) -> Float[Array, "r k l p"]:
     return jax.vmap(record)(pieces, *point)
 
 
-def _slopes(terms, system, t, state):
-    """Return the derivatives of the accelerations with respect to the strengths, shape
-    `(p,)`.
-    """
-    motion = system.motion(t, state, field=system.base.vector_field(t, state))
+@program
+def _slopes(terms, motion: Motion) -> Float[Array, "r k l p"]:
+    """Return the derivatives of the accelerations with respect to the strengths."""
 
-    def total(terms):
+    def total(terms, motion):
         return sum(term.acceleration(motion) for term in terms)
 
-    slopes = eqx.filter_grad(total)(terms)
-    return jnp.stack([value for term in slopes for value in term.numbers()])
+    def slopes(motion):
+        found = eqx.filter_grad(total)(terms, motion)
+        return jnp.stack([value for term in found for value in term.numbers()])
+
+    flat = jax.tree.map(lambda part: part.reshape(-1, *part.shape[3:]), motion)
+    found = jax.vmap(slopes)(jax.tree.map(jnp.asarray, flat))
+    return found.reshape(*motion.t.shape, -1)
