@@ -1,5 +1,7 @@
 """Diagnoses of a rig with switching surfaces: a cart that sticks, with a soft stop."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from test_fitting_switched import Cart, SENSORS
 
 from jaxcam.discrepancy import diagnose
 from jaxcam.discrepancy.terms import (
+    library,
     Relaxation,
     system_with_element,
     system_with_terms,
@@ -40,6 +43,23 @@ def diagnosis_of(truth):
     ]
     parts = segment_by_model(Model(start, SENSORS), runs)
     return diagnose(start, tuple(parts), sensors=SENSORS, parameters=free)
+
+
+def test_branches_together_are_the_branches_one_by_one():
+    """With terms that do and do not depend on the force of the branch, and with an
+    element; equal to rounding."""
+    named = {term.name: term for term in library()}
+    drag = dataclasses.replace(named["quadratic_drag"], c2=jnp.asarray(0.3))
+    friction = dataclasses.replace(named["coulomb_friction"], fc=jnp.asarray(0.2))
+    system = system_with_terms(Cart(), (drag, friction))
+    wide = system_with_element(system, Relaxation(), (0, 1))
+    rows = jnp.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    cases = ((system, jnp.array([0.031, 0.2])), (wide, jnp.array([0.031, -0.2, 0.5])))
+    for one, state in cases:
+        together = one.branches(0.1, state, rows)
+        alone = jnp.stack([one.branch(0.1, state, sides) for sides in rows])
+        np.testing.assert_allclose(together, alone, rtol=1e-14, atol=0)
+        assert np.ptp(np.asarray(together)[:, 1]) > 0.1
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import abc
 from typing import Any, Literal
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -73,6 +74,23 @@ class SwitchedSystem(HybridSystem):
         Returns:
             Rates per second, shape `(n,)`; smooth in time and state for fixed sides.
         """
+
+    def branches(
+        self, t: RealScalar, state: State, sides: Float[Array, "rows k"]
+    ) -> Float[Array, "rows n"]:
+        """Return the rates of change on several combinations of sides.
+
+        Override it if the branches have parts in common that take time to compute.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+            sides: +1 or -1, one row for each combination, shape `(rows, k)`.
+
+        Returns:
+            Rates per second, shape `(rows, n)`.
+        """
+        return jax.vmap(lambda one: self.branch(t, state, one))(sides)
 
     def vector_field(self, t: RealScalar, state: State) -> State:
         """Return the rate of change on the sides that `sides` gives for this state."""

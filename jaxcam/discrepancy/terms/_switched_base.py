@@ -24,6 +24,13 @@ class SwitchedWithTerms(WithTerms, SwitchedWrapping):
     def branch(self, t, state, sides) -> jax.Array:
         return self._pushed(t, state, self.base.branch(t, state, sides))
 
+    def branches(self, t, state, sides) -> jax.Array:
+        fields = self.base.branches(t, state, sides)
+        # forces change with the sides, velocities do not; a term that depends on the
+        # motion alone is therefore evaluated only once
+        own = fields[0]
+        return jax.vmap(lambda field: self._pushed(t, state, field, own))(fields)
+
 
 class SwitchedWithHidden(WithHidden, SwitchedWrapping):
     """A switched system with an element that has an internal state; this state does not
@@ -41,6 +48,10 @@ class SwitchedWithHidden(WithHidden, SwitchedWrapping):
 
     def branch(self, t, state, sides) -> jax.Array:
         return self._driven(state, self.base.branch(t, self._own(state), sides))
+
+    def branches(self, t, state, sides) -> jax.Array:
+        fields = self.base.branches(t, self._own(state), sides)
+        return jax.vmap(lambda field: self._driven(state, field))(fields)
 
     def sides(self, t, state):
         return self.base.sides(t, self._own(state))

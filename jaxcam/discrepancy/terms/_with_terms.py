@@ -42,14 +42,17 @@ class WithTerms(Wrapping):
         new = self.base.prepared(), terms
         return eqx.tree_at(lambda s: (s.base, s.terms), self, new)
 
-    def motion(self, t, state, coordinate: int = 0, field=None) -> Motion:
+    def motion(self, t, state, coordinate: int = 0, field=None, moving=None) -> Motion:
         """Return the motion at which the terms of a coordinate are evaluated.
 
         Args:
             field: Rate of change of the state, if known.
+            moving: Rate of change of the state on other sides of switching surfaces,
+                which has the same velocities; default: `field`.
         """
         place, rate = self.coordinates[coordinate]
-        velocity = state[rate] if field is None else field[place]
+        moving = field if moving is None else moving
+        velocity = state[rate] if moving is None else moving[place]
         pushed = 0.0 if field is None else field[rate]
         turned = drive_at(self.base, t)
         return Motion(t, state[place], velocity, *turned, state, pushed)
@@ -57,11 +60,14 @@ class WithTerms(Wrapping):
     def vector_field(self, t, state) -> jax.Array:
         return self._pushed(t, state, self.base.vector_field(t, state))
 
-    def _pushed(self, t, state, field) -> jax.Array:
-        """Return the field of the base with the forces of the terms."""
+    def _pushed(self, t, state, field, moving=None) -> jax.Array:
+        """Return the field of the base with the forces of the terms.
+
+        **Arguments:** `field` and `moving` as for `motion`.
+        """
         rate = field
         for term in self._acting(Where.FLIGHT):
-            motion = self.motion(t, state, term.coordinate, field)
+            motion = self.motion(t, state, term.coordinate, field, moving)
             pushed = self.coordinates[term.coordinate][1]
             rate = rate.at[pushed].add(term.acceleration(motion))
         return rate

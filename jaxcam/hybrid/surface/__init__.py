@@ -69,6 +69,7 @@ from ._sliding import (
     hold_of as hold_of,
     InMode as InMode,
     Jumps as Jumps,
+    open_distances as open_distances,
     open_surfaces as open_surfaces,
     settled as settled,
     slack_of_hold as slack_of_hold,

@@ -107,17 +107,21 @@ class SlideTerms(NamedTuple):
     changes: Float[Array, "K m"]
 
 
+@eqx.filter_jit
 def slide_terms(mode: InMode, t, x) -> SlideTerms:
-    """Return the terms of sliding, contact forces included."""
+    """Return the terms of sliding, contact forces included.
+
+    Compiled functions evaluate them in many places; as a program of its own, they are
+    traced only once.
+    """
     chosen = mode.slidable
     before = OnSides(mode.system, mode.negative)
     beyond = [mode.beyond(k) for k in chosen]
-    own = before.vector_field(t, x)
+
+    sides = jnp.stack([side.signs for side in (before, *beyond)])
+    own, *others = mode.system.branches(t, x, sides)
     kicks = jnp.stack(
-        [
-            _only(mode.jumps[k], side.vector_field(t, x) - own)
-            for k, side in zip(chosen, beyond, strict=True)
-        ]
+        [_only(mode.jumps[k], other - own) for k, other in zip(chosen, others)]
     )
 
     def heights(s, y):
@@ -238,11 +242,18 @@ def slack_of_hold(mode: OnSides) -> Float[Array, " k"]:
     return (_of_each(mode.system.holding, mode) - 1.0) / 2
 
 
+def open_distances(mode: OnSides, t, x) -> Float[Array, " k"]:
+    """Return the distance of a motion that does not slide from each surface, shape
+    `(k,)`.
+    """
+    return mode.signs * surfaces(mode.system, t, x) + mode.system.hysteresis
+
+
 def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
     """Return the distance from each surface, zero at a crossing or at the end of
     sliding, shape `(k,)`.
     """
-    open_ones = mode.signs * surfaces(mode.system, t, x) + mode.system.hysteresis
+    open_ones = open_distances(mode, t, x)
     if not mode.slidable:
         return open_ones
     terms = slide_terms(mode, t, x)
@@ -268,7 +279,7 @@ def open_surfaces(mode: InMode, t, x) -> tuple:
         return contact_forces(side, s, y, mode.contact)[1]
 
     def distance(s, y):
-        return mode.signs * surfaces(mode.system, s, y) + mode.system.hysteresis
+        return open_distances(mode, s, y)
 
     rates = motion_rates(field, t, x)
     jets = jnp.stack(along_path(distance, t, x, rates, 3), axis=1)
