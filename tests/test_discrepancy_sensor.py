@@ -26,7 +26,8 @@ from jaxcam.discrepancy.terms import (
 )
 from jaxcam.fitting import Model, Parameter, read_setup, Sensor
 from jaxcam.fitting.engine import DriveState
-from jaxcam.fitting.engine._predict import calibration, fly, samples
+from jaxcam.fitting.engine._fly import fly
+from jaxcam.fitting.engine._predict import calibration, samples
 from jaxcam.models import BouncingBall, ImpactOscillator
 from jaxcam.recordings import Recording
 

@@ -8,7 +8,7 @@ from scipy.signal import savgol_filter
 
 from jaxcam.fitting import Model, Parameter, Problem, segment_by_model, Sensor, Turning
 from jaxcam.fitting.engine import DriveState
-from jaxcam.fitting.engine._predict import fly
+from jaxcam.fitting.engine._fly import fly
 from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import Recording
 

@@ -10,10 +10,11 @@ import pytest
 
 from jaxcam.fitting import fit, Parameter, Problem, Sensor
 from jaxcam.fitting.engine import DriveState
+from jaxcam.fitting.engine._fly import fly
 from jaxcam.fitting.engine._layout import Layout
 from jaxcam.fitting.engine._model import Model
 from jaxcam.fitting.engine._pieces import _PIECE, spans
-from jaxcam.fitting.engine._predict import contact_state, fly
+from jaxcam.fitting.engine._predict import contact_state
 from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall
 from jaxcam.recordings import Recording, segment

@@ -26,7 +26,7 @@ from .engine import (
     runge_kutta,
     state_size,
     surfaces_in,
-    switched_nodes,
+    switched_steps,
     Turning,
     with_constants,
 )
@@ -260,9 +260,9 @@ def simulated(model: Model, one: Prepared) -> Simulated:
             middle = step * (jnp.arange(one.steps, dtype=float) + 0.5)
             each = DriveState(*(part + 0.0 * middle for part in drive))
             each = each._replace(angle=drive.angle + drive.rate * middle)
-            found = switched_nodes(model, x, t, step, each, 1, mode, _EVENTS)
-            states, rates, mode, events = found
-            return (states[-1], mode), seen(t, system, x, rates[0], events)
+            given = model, x, t, step, each, mode, _EVENTS
+            end, rate, found = switched_steps(*given)
+            return (end, found.mode), seen(t, system, x, rate, found.events)
 
         def advance(x, k):
             at = t + k * step

@@ -21,6 +21,7 @@ from ._eliminate import (
     state_steps as state_steps,
 )
 from ._event_limit import crowded_pieces as crowded_pieces
+from ._fly import runge_kutta as runge_kutta
 from ._known_constants import with_constants as with_constants
 from ._layout import Layout as Layout
 from ._linear import (
@@ -57,7 +58,6 @@ from ._output import Output as Output
 from ._own_states import own_states as own_states
 from ._parameter import Parameter as Parameter
 from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
-from ._predict import runge_kutta as runge_kutta
 from ._problem import Problem as Problem, Weights as Weights
 from ._problem_checks import parameter_places as parameter_places
 from ._seen_directly import shows_directly as shows_directly
@@ -69,4 +69,7 @@ from ._sharpness import (
     separated as separated,
 )
 from ._starts import state_size as state_size
-from ._switched_steps import EVENTS as EVENTS, switched_nodes as switched_nodes
+from ._switched_steps import (
+    EVENTS as EVENTS,
+    switched_steps as switched_steps,
+)

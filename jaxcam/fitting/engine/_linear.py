@@ -11,10 +11,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._fly import exact_flight, fly_about
 from ._likelihood import score_all
 from ._model import Model
 from ._pieces import FLIGHT, IMPACT, Pieces
-from ._predict import calibration, flight_joint, fly, impact_joint, rest, samples
+from ._predict import (
+    calibration,
+    flight_joint,
+    impact_joint,
+    rest,
+    samples,
+)
 from ._through_nodes import normal_through, shares_of
 
 
@@ -161,9 +168,14 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
 
     def piece(state, start, step, drive, place, value, weight):
+        # outside the derivatives, because those of a loop that locates events take
+        # long to compile
+        begun = state, start, step, drive
+        exact = exact_flight(model_at(origin, start, step), *begun, pieces.substeps)
+
         def flight(state, change):
             model = model_at(change, start, step)
-            end, nodes = fly(model, state, start, step, drive, pieces.substeps)
+            end, nodes = fly_about(exact, model, state, start, step, drive)
             return end, (nodes, calibration(model))
 
         def sampled(model, known):
@@ -253,8 +265,9 @@ def _columns(function, *args):
     return jax.vmap(pushed, out_axes=(None, -1))(*unit)
 
 
-def flown(model: Model, state, start, step, drive, place, *, substeps):
-    end, nodes = fly(model, state, start, step, drive, substeps)
+def flown(flying, model: Model, state, start, step, drive, place, *, substeps):
+    """Return the end of a piece and its samples; `flying` is `fly` or `fly_exactly`."""
+    end, nodes = flying(model, state, start, step, drive, substeps)
     along = _along(start, step, drive)
     return end, samples(model, nodes, calibration(model), start, step, place, along)
 

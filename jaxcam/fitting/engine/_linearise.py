@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from ...hybrid.programs import program
 from ._each_record import each_record, of_record
+from ._fly import fly, fly_exactly
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
@@ -131,13 +132,14 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 
 @program
 def _predict_one(layout, pieces, extras, values, states):
-    return _predicted_one(layout, pieces, extras, values, states, pieces.substeps)
+    given = values, states, pieces.substeps
+    return _predicted_one(layout, pieces, extras, *given, fly_exactly)
 
 
-def _predicted_one(layout, pieces, extras, values, states, substeps):
+def _predicted_one(layout, pieces, extras, values, states, substeps, flying=fly):
     """Predict one recording, given its arrays."""
     model = layout.at(values)
-    end, seen = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(
+    end, seen = jax.vmap(lambda *a: flown(flying, model, *a, substeps=substeps))(
         states, *flight_inputs(pieces)
     )
     resting = rested_all(model, pieces, extras)

@@ -15,6 +15,7 @@ from ...hybrid.surface import (
     InMode,
     Jumps,
     OnSides,
+    open_distances,
     resets,
     slack_of_hold,
     surfaces,
@@ -83,16 +84,13 @@ def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
     slidable = [bool(changed) for changed in known.jumps.free]
     if not any(slidable):
         return free
-    own, other = (
-        known.within(system, Mode(sides, free.sliding))
-        for sides in (negative, ~negative)
-    )
-    height, rate = distances_along(own, t, x, own.vector_field(t, x))
-    _, beyond = distances_along(other, t, x, other.vector_field(t, x))
+    height, rate = _open_along(OnSides(system, negative), t, x)
+    _, beyond = _open_along(OnSides(system, ~negative), t, x)
     change = jnp.abs(rate + beyond) * duration
     near = jnp.array(slidable) & (jnp.abs(height) <= _STOPPED * change)
     held, _ = hold_of(known.within(system, Mode(negative, near)), t, x)
-    return Mode(negative, near & (held <= 0) & (slack_of_hold(own) > 0))
+    slack = slack_of_hold(OnSides(system, negative))
+    return Mode(negative, near & (held <= 0) & (slack > 0))
 
 
 def on_side_of(system: HybridSystem, t, x) -> HybridSystem:
@@ -110,6 +108,21 @@ def distances_along(system: InMode, t, x, rate):
     """
     along = jnp.ones_like(t), rate
     return jax.jvp(lambda s, y: switching_distances(system, s, y), (t, x), along)
+
+
+def _open_along(system: OnSides, t, x):
+    """Return the distances `(k,)` of a motion that does not slide from the surfaces,
+    and their rates of change.
+
+    Unlike those of sliding, these distances do not depend on the vector field, so that
+    a program contains it only once.
+    """
+
+    def distances(s, y):
+        return open_distances(system, s, y)
+
+    along = jnp.ones_like(t), system.vector_field(t, x)
+    return jax.jvp(distances, (t, x), along)
 
 
 def state_after(system: InMode, t, x, ends: Bool[Array, " k"]) -> Float[Array, " n"]:
@@ -147,9 +160,8 @@ def mode_after(
         return Mode(system.negative ^ ends, system.sliding)
     turns = ends & (~slid | (beyond_shares(system, t, x) > 0.5))
     left = Mode(system.negative ^ turns, system.sliding & ~ends)
-    _, before = distances_along(system, t, x, system.vector_field(t, x))
-    beyond = known.within(system.system, left)
-    _, rate = distances_along(beyond, t, after, beyond.vector_field(t, after))
+    _, before = _open_along(system, t, x)
+    _, rate = _open_along(known.within(system.system, left), t, after)
     # static friction stops a motion that kinetic friction would not reverse
     slack = slack_of_hold(system)
     back = rate <= jnp.maximum(-before, 0.0) * slack / (1 + slack)

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid.programs import program
+from ._fly import end_of_flight
 from ._layout import Layout
-from ._linear import Extras, flight_inputs, flown
+from ._linear import Extras
 from ._linearise import Point
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
@@ -151,9 +152,9 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
     def one(values, states, pieces):
         model = layout.at(values)
         size = states.shape[-1] - len(filtered_channels(model))
-        inputs = states, *flight_inputs(pieces)
-        ends, _ = jax.vmap(lambda *a: flown(model, *a, substeps=substeps))(*inputs)
         part = pieces.flown
+        inputs = states, part.start, part.step, pieces.drive
+        ends = jax.vmap(lambda *a: end_of_flight(model, *a, substeps=substeps))(*inputs)
         times = part.start + part.step * part.place.shape[-2]
 
         def landed(t, x, drive):

@@ -1,109 +1,22 @@
-"""Predict one piece: its samples, its end and its joint."""
+"""Predict one piece: its samples and its joint."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...hybrid import HybridSystem, SwitchedSystem
-from ...hybrid.runge_kutta import array_step, RK4
+from ...hybrid import HybridSystem
 from ...hybrid.surface import gaps, impacts
 from ._constant import constant
+from ._fly import runge_kutta
 from ._model import augmented_field, DriveState, filtered_channels, Model
 from ._modes import on_side_of
-from ._readings import Nodes, readings
-from ._switched_steps import switched_end, switched_nodes
+from ._readings import Nodes
 
 
 # Steps of Newton's method
 _NEWTON = 4
-
-
-def fly(model: Model, state, start, step, drive: DriveState, substeps: Any = 1):
-    """Integrate one piece of flight by the classical Runge-Kutta method.
-
-    Each step is divided into `substeps` parts (a number or an integer array) for the
-    values, but not for the derivatives, which need far fewer digits and cost far more.
-
-    **Returns:** the state at the end of the piece `(n,)`, and its `Nodes`.
-    """
-    if isinstance(model.system, SwitchedSystem):
-        states, fields, *_ = switched_nodes(model, state, start, step, drive, substeps)
-    else:
-        states, fields = _nodes(model, state, start, step, drive, 1)
-        if not _is_one(substeps):
-            still, begin = constant((model, state))
-            fine = _nodes(still, begin, start, step, drive, substeps)
-            states, fields = (
-                coarse + jax.lax.stop_gradient(better - coarse)
-                for better, coarse in zip(fine, (states, fields))
-            )
-    return states[-1], readings(model, states, fields, start, step, drive)
-
-
-def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps):
-    """Return the state at the end of a piece, `(n,)`, without derivatives; `substeps`
-    may be traced.
-    """
-    if isinstance(model.system, SwitchedSystem):
-        return switched_end(model, state, start, step, drive, substeps)
-    return _nodes(model, state, start, step, drive, substeps)[0][-1]
-
-
-def _is_one(substeps) -> bool:
-    return isinstance(substeps, int) and substeps == 1
-
-
-def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
-    """Return the states at the ends of all steps `(n + 1, s)`, and their rates."""
-    part = step / jnp.asarray(substeps, dtype=float)
-
-    def advance(x, inputs):
-        number, here = inputs
-        t0 = start + number * step
-        system_at = model.during(t0 + step / 2, here)
-        if _is_one(substeps):
-            x1, k1 = runge_kutta(model, system_at, t0, x, step)
-            return x1, (x, k1)
-
-        def inner(k, x):
-            t = t0 + jnp.asarray(k, dtype=float) * part
-            return runge_kutta(model, system_at, t, x, part)[0]
-
-        k1 = augmented_field(model, system_at(t0), t0, x)
-        return jax.lax.fori_loop(0, substeps, inner, x), (x, k1)
-
-    count = drive.angle.shape[0]
-    numbers = jnp.arange(count, dtype=float)
-    end, (states, fields) = jax.lax.scan(advance, state, (numbers, drive))
-    t1 = start + count * step
-    final = DriveState(*(part[-1] for part in drive))
-    system = model.during(t1 - step / 2, final)(t1)
-    last = augmented_field(model, system, t1, end)
-    states = jnp.concatenate([states, end[None]])
-    return states, jnp.concatenate([fields, last[None]])
-
-
-def runge_kutta(model: Model, system_at, t, x, h):
-    """Take one classical Runge-Kutta step of length `h`.
-
-    Args:
-        model: The model.
-        system_at: The system as a function of time.
-        t: Time (s).
-        x: State, shape `(n,)`.
-        h: Step length (s).
-
-    Returns:
-        The state after the step, and the slope at its start.
-    """
-
-    def field(t, x):
-        return augmented_field(model, system_at(t), t, x)
-
-    after, _, first = array_step(RK4, field, t, x, h)
-    return after, first
 
 
 def rest(model: Model, guess, start, step, drive: DriveState):

@@ -76,8 +76,10 @@ from ._starts import state_size, suggested_starts
 from ._step_size import (
     enough_substeps,
     followed_by_cubics,
+    followed_by_lines,
     longest_flight,
-    steps_for_inputs,
+    steps_for_filters,
+    steps_of_samples,
 )
 
 
@@ -191,14 +193,20 @@ class Problem:
             pieces, cuts = gather(
                 segments, tuple(sensors), steps, measured, curved, rests, flying
             )
-            needed = steps_for_inputs(model, segments, pieces, steps)
+            needed = steps_for_filters(model, pieces, steps)
             if needed > steps and steps < _MOST_STEPS:
                 steps = min(needed, _MOST_STEPS)
                 continue
             states, guess = suggested_starts(model, segments, cuts, pieces)
             point = Point(jnp.asarray(values), jnp.asarray(states))
             refuse_not_finite(layout, segments, pieces, point)
-            if steps >= _MOST_STEPS or followed_by_cubics(layout, pieces, point):
+            if steps >= _MOST_STEPS:
+                break
+            if not followed_by_lines(layout, segments, pieces, point, steps):
+                finest = steps_of_samples(segments, pieces, steps)
+                steps = min(2 * steps, finest, _MOST_STEPS)
+                continue
+            if followed_by_cubics(layout, pieces, point):
                 break
             steps = min(2 * steps, _MOST_STEPS)
         extras = joint_sharpness(layout, pieces, point, guess)

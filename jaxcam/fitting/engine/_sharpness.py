@@ -7,12 +7,13 @@ import numpy as np
 from jaxtyping import Float
 
 from ...hybrid.programs import program
+from ._fly import fly
 from ._layout import Layout
 from ._linear import Extras, Sharpness
 from ._linearise import assemble, Point
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
-from ._predict import after_impact, fly, smallest_gap
+from ._predict import after_impact, smallest_gap
 
 
 # Standard error of a joint within a flight, relative to that of the state from the

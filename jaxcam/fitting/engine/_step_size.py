@@ -8,20 +8,29 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid.programs import program
+from ...hybrid.surface import OnSides
+from ._driven_steps import line_error
+from ._fly import end_of_flight, fly_exactly
 from ._layout import Layout
 from ._linear import Extras
 from ._linearise import Point
-from ._model import DriveState, Input, Model
+from ._model import DriveState, filtered_channels, Input, Model
+from ._modes import on_side_of
+from ._output import Output
 from ._pieces import Pieces
-from ._predict import end_of_flight, fly
 
 
 # Allowed change of a state (in units of the error of a piece's state) when the length
 # of the substeps is halved
 _STEP_ERROR = 0.01
 _MOST_SUBSTEPS = 16
-# Allowed error (in units of the noise) of the cubics between the ends of the steps
-_CUBIC_ERROR = 0.05
+# Allowed error (in units of the noise) of the cubics between the ends of the steps: its
+# rms over a piece, and its maximum. A cubic cannot follow a jump of the acceleration,
+# but this affects single steps only
+_CUBIC_ERROR, _CUBIC_MOST = 0.035, 0.1
+# Allowed change of a channel (in units of the noise) if the input followed its samples
+# within the steps
+_LINE_ERROR = 0.05
 # Number of pieces in a flight above which the allowed change decreases, because errors
 # accumulate along a flight
 _LONG = 16
@@ -39,27 +48,109 @@ def longest_flight(cuts) -> int:
     return max(int(np.max(count, initial=0)) for count in counts)
 
 
-def steps_for_inputs(model: Model, segments, pieces: Pieces, steps: int) -> int:
-    """Return the number of steps of a piece that resolve the input and the sensor
-    filters, at least the present number `steps`.
+def steps_for_filters(model: Model, pieces: Pieces, steps: int) -> int:
+    """Return the number of steps of a piece that resolve the sensor filters, at least
+    the present number `steps`.
 
-    A step must not be longer than the interval between the samples of an input. It must
-    also resolve the settling of a filter after an impact, which `followed_by_cubics`
-    does not show, because the estimated initial states assume settled filters.
+    The steps must resolve the settling of a filter after an impact, which
+    `followed_by_cubics` does not show, because the estimated initial states assume
+    settled filters.
     """
-    longest = steps * float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
-    interval = min(part.recording.interval for part in segments)
     bounds = [
         _FILTER_STEP / (2 * np.pi * s.bandwidth_hz)
         for s in model.sensors.values()
         if s.filtered
     ]
-    if isinstance(model.drive, Input):
-        bounds.append(interval)
-    needed = max((longest / bound for bound in bounds), default=0.0)
-    if needed <= steps:
+    return _steps_of(min(bounds), pieces, steps) if bounds else steps
+
+
+def steps_of_samples(segments, pieces: Pieces, steps: int) -> int:
+    """Return the number of steps of a piece that are as short as the interval between
+    the samples, at least the present number `steps`.
+    """
+    return _steps_of(min(part.recording.interval for part in segments), pieces, steps)
+
+
+def _steps_of(length: float, pieces: Pieces, steps: int) -> int:
+    """Return the number of steps not longer than `length` (s), at least the present
+    number `steps`.
+    """
+    longest = steps * float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    if longest / length <= steps:
         return steps
-    return _MULTIPLE * math.ceil(needed / _MULTIPLE)
+    return _MULTIPLE * math.ceil(longest / length / _MULTIPLE)
+
+
+def followed_by_lines(
+    layout: Layout, segments, pieces: Pieces, point: Point, steps: int
+) -> bool:
+    """Return whether the channels would hardly change if the input followed its samples
+    within each step, instead of a line.
+
+    Args:
+        layout: The model, with an input or without one.
+        segments: The recordings.
+        pieces: Their pieces.
+        point: Parameter values, and states at the beginning of the pieces.
+        steps: Number of steps of a piece.
+
+    Returns:
+        Whether the change is much smaller than the noise.
+    """
+    source, sensors = layout.model.drive, layout.model.sensors.values()
+    if not isinstance(source, Input) or steps >= steps_of_samples(
+        segments, pieces, steps
+    ):
+        return True
+    if any(isinstance(one.observe, Output) for one in sensors):
+        # such an output may show the input itself
+        return False
+    starts, lengths = (np.asarray(pieces.flown.start), np.asarray(pieces.flown.step))
+    edges = starts[..., None] + lengths[..., None] * np.arange(steps + 1)
+    off = line_error(segments, source, edges)
+    # the slope of a cubic at an end of a step changes it by at most 4/27 of a step
+    once = off.once + 4 / 27 * lengths[..., None] * off.ends
+    most = (np.max(one, axis=-1)[..., None] for one in (once, off.twice))
+    gains = map(np.abs, map(np.asarray, _input_gains(layout, pieces, point)))
+    total = sum(size * gain for size, gain in zip(most, gains))
+    floors = np.array([float(one.floor / abs(one.gain)) for one in sensors])
+    inside = np.asarray(pieces.exists)[..., None]
+    return bool(np.max(np.where(inside, total / floors, 0.0)) < _LINE_ERROR)
+
+
+@program
+def _input_gains(layout: Layout, pieces: Pieces, point: Point):
+    """Return the changes of the channels at the beginning of each piece, `(r, k, c)`,
+    per integral and per second integral of a change of the input.
+    """
+
+    def one(model, state, start, drive):
+        size = state.shape[0] - len(filtered_channels(model))
+        here = DriveState(*(part[0] for part in drive))
+        fixed = on_side_of(model.driven(start, here), start, state[:size])
+
+        def rates(level, x):
+            system = model.driven(start, here._replace(angle=level))
+            if isinstance(fixed, OnSides):
+                system = OnSides(system, fixed.negative)  # pyright: ignore
+            return system.vector_field(start, x)
+
+        x, unit = state[:size], jnp.ones_like(start)
+        _, pushed = jax.jvp(lambda u: rates(u, x), (here.angle,), (unit,))
+        _, moved = jax.jvp(lambda y: rates(here.angle, y), (x,), (pushed,))
+
+        def seen(y):
+            values = [s.seen(fixed, start, y) for s in model.sensors.values()]
+            return jnp.stack(values)
+
+        return tuple(jax.jvp(seen, (x,), (along,))[1] for along in (pushed, moved))
+
+    def record(values, states, start, drive):
+        model = layout.at(values)
+        return jax.vmap(lambda *piece: one(model, *piece))(states, start, drive)
+
+    start = jnp.asarray(pieces.flown.start)
+    return jax.vmap(record)(point.values, point.states, start, pieces.drive)
 
 
 def followed_by_cubics(layout: Layout, pieces: Pieces, point: Point) -> bool:
@@ -67,11 +158,15 @@ def followed_by_cubics(layout: Layout, pieces: Pieces, point: Point) -> bool:
 
     They are compared with the integrated motion in the middle of each step.
     """
-    off = np.abs(_off_middles(layout, pieces, point))
+    rms, most = map(np.asarray, _off_middles(layout, pieces, point))
     sensors = layout.model.sensors.values()
     floors = np.array([float(one.floor / abs(one.gain)) for one in sensors])
     inside = pieces.exists[..., None]
-    return bool(np.max(np.where(inside, off / floors, 0.0)) < _CUBIC_ERROR)
+
+    def worst(off):
+        return np.max(np.where(inside, off / floors, 0.0))
+
+    return bool(worst(rms) < _CUBIC_ERROR and worst(most) < _CUBIC_MOST)
 
 
 def enough_substeps(
@@ -113,7 +208,9 @@ def _ends(layout: Layout, pieces: Pieces, point: Point, substeps):
 
 @program
 def _off_middles(layout: Layout, pieces: Pieces, point: Point):
-    """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
+    """Return the rms and the maximum of the error of the cubics in each piece and
+    channel, `(r, k, c)` each.
+    """
 
     def one(model, state, start, step, drive):
         # the drive in the two halves of each step, within which drive and input are
@@ -121,10 +218,11 @@ def _off_middles(layout: Layout, pieces: Pieces, point: Point):
         twice = DriveState(*(jnp.repeat(part, 2, axis=-1) for part in drive))
         quarter = jnp.tile(jnp.array([-0.25, 0.25]), drive.angle.shape[-1]) * step
         twice = twice._replace(angle=twice.angle + quarter * twice.rate)
-        _, halves = fly(model, state, start, step / 2, twice)
+        _, halves = fly_exactly(model, state, start, step / 2, twice)
         left, middle, right = halves.left[::2], halves.right[::2], halves.right[1::2]
         bend = (halves.left_rate[::2] - halves.right_rate[1::2]) * step / 8
-        return jnp.max(jnp.abs((left + right) / 2 + bend - middle), axis=0)
+        off = jnp.abs((left + right) / 2 + bend - middle)
+        return jnp.sqrt(jnp.mean(off**2, axis=0)), jnp.max(off, axis=0)
 
     return _of_each(layout, pieces, point, one)
 

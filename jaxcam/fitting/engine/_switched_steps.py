@@ -6,99 +6,36 @@ the implicit function theorem. The derivatives therefore contain the saltation m
 of all crossings, of the beginning of sliding and of its end.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float
 
 from ...hybrid.runge_kutta import array_step, RK4
 from ...hybrid.surface import switching_distances
 from ._constant import constant
-from ._model import augmented_field, DriveState, filtered_channels, Model
-from ._modes import (
-    distances_along,
-    first_mode,
-    Mode,
-    mode_after,
-    state_after,
-    Surfaces,
-    surfaces_in,
-)
+from ._event_search import advancing, begun, Located, located, Part, Steps
+from ._model import DriveState, filtered_channels, Model
+from ._modes import distances_along, first_mode, Mode, state_after, surfaces_in
 
 
 # Maximum number of events located in a piece, which is at most half an oscillation
 EVENTS = 8
-# Maximum number of Runge-Kutta steps that locate an event: one to the end, one of
-# length zero, and those of the Illinois method
-_SEARCH = 10
 
 
-class Part(NamedTuple):
-    """A part of a step: up to an event or to the end of the step."""
+class SwitchedFlight(NamedTuple):
+    """The exact motion of a piece."""
 
-    number: Int[Array, ""]
-    """Index of the step."""
-    offset: Float[Array, ""]
-    """Time since the beginning of the step (s)."""
-    length: Float[Array, ""]
-    """Duration (s)."""
-    state: Float[Array, " s"]
-    """State at the beginning, shape `(s,)`."""
-    mode: Mode
-    """Mode of the motion."""
-    ends: Bool[Array, " k"]
-    """The surface whose event ends the part, if any."""
-    after: Mode
-    """Mode of the motion after the part."""
+    states: Float[Array, "n1 s"]
+    """States at the ends of all steps, shape `(n + 1, s)`."""
+    rates: Float[Array, "n1 s"]
+    """Their rates, shape `(n + 1, s)`."""
+    located: Located
+    """The events."""
 
 
-class Located(NamedTuple):
-    """The parts of a piece between its events, and its end."""
-
-    parts: Part
-    """The parts; those that are not needed have no length."""
-    end: Float[Array, " s"]
-    """State at the end, shape `(s,)`."""
-    mode: Mode
-    """Mode at the end."""
-
-
-class _Steps(NamedTuple):
-    """The steps of a piece."""
-
-    model: Model
-    start: Float[Array, ""]
-    step: Float[Array, ""]
-    drive: DriveState
-    surfaces: Surfaces
-    size: int
-    """Number of components of the system's state, without those of sensor filters."""
-    events: int
-    """Number of events that are located."""
-
-    @property
-    def count(self) -> int:
-        return self.drive.angle.shape[0]
-
-    def begin(self, number):
-        """Return the time at which a step begins."""
-        return self.start + jnp.asarray(number, dtype=float) * self.step
-
-    def in_mode(self, number, mode: Mode) -> Callable:
-        """Return the system in one mode as a function of time, during a step."""
-        here = DriveState(*(part[number] for part in self.drive))
-        system_at = self.model.during(self.begin(number) + self.step / 2, here)
-        return lambda t: self.surfaces.within(system_at(t), mode)
-
-    def field(self, number, mode: Mode) -> Callable:
-        """Return the vector field in one mode, sensor filters included."""
-        system_at = self.in_mode(number, mode)
-        return lambda t, x: augmented_field(self.model, system_at(t), t, x)
-
-
-def switched_nodes(
+def switched_flight(
     model: Model,
     state,
     start,
@@ -107,24 +44,60 @@ def switched_nodes(
     substeps,
     mode: Mode | None = None,
     events: int = EVENTS,
-):
-    """Return the states at the ends of all steps `(n + 1, s)`, their rates, the mode at
-    the end, and the number of events.
+) -> SwitchedFlight:
+    """Locate the events of a piece, without derivatives.
 
     **Arguments:** as for `fly`, the `mode` at the start (default: that of a motion that
     starts there), and the maximum number of events.
     """
+    model, state, mode = constant((model, state, mode))
     steps, mode = _steps(model, state, start, step, drive, mode, events)
-    fixed, begin, first = constant((steps, state, mode))
-    found = _located(fixed, begin, first, substeps)
-    states, rates, end = _integrated(steps, state, found.parts)
+    found = located(steps, state, mode, substeps)
+    first = _at_steps(found.parts, steps)
+
+    def rate(number, x, mode):
+        return steps.field(number, mode)(steps.begin(number), x)
+
+    rates = jax.vmap(rate)(jnp.arange(steps.count), first.state, first.mode)
+    last = _last_rate(steps, found, found.end)
+    return SwitchedFlight(
+        jnp.concatenate([first.state, found.end[None]]),
+        jnp.concatenate([rates, last[None]]),
+        found,
+    )
+
+
+def switched_nodes(
+    model: Model, state, start, step, drive: DriveState, flight: SwitchedFlight
+) -> tuple[Float[Array, "n1 s"], Float[Array, "n1 s"]]:
+    """Return the states at the ends of all steps, and their rates, with derivatives.
+
+    **Arguments:** as for `fly`, and the exact motion of the piece.
+    """
+    steps, _ = _steps(model, state, start, step, drive, flight.located.mode, EVENTS)
+    states, rates, end = _integrated(steps, state, flight.located.parts)
     states = jnp.concatenate([states, end[None]])
-    fine = jnp.concatenate([_at_steps(found.parts, steps).state, found.end[None]])
-    states = states + jax.lax.stop_gradient(fine - states)
-    last = steps.field(steps.count - 1, found.mode)
-    final = last(start + steps.count * step, states[-1])
-    count = jnp.sum(jnp.any(found.parts.ends, axis=-1))
-    return states, jnp.concatenate([rates, final[None]]), found.mode, count
+    last = _last_rate(steps, flight.located, states[-1])
+    return states, jnp.concatenate([rates, last[None]])
+
+
+def switched_steps(
+    model: Model, state, start, step, drive: DriveState, mode: Mode, events: int
+) -> tuple[Float[Array, " s"], Float[Array, " s"], Located]:
+    """Return the state at the end of a motion without substeps and the rate at its
+    start, with derivatives, and its events.
+
+    **Arguments:** as for `switched_flight`.
+    """
+    given = model, state, start, step, drive
+    flight = switched_flight(*given, 1, mode, events)
+    states, rates = switched_nodes(*given, flight)
+    return states[-1], rates[0], flight.located
+
+
+def _last_rate(steps: Steps, found: Located, end):
+    field = steps.field(steps.count - 1, found.mode)
+    return field(steps.begin(steps.count), end)
 
 
 def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
@@ -147,11 +120,11 @@ def _ended(model: Model, state, start, step, drive: DriveState, substeps, events
     located.
     """
     steps, mode = _steps(model, state, start, step, drive, None, events)
-    advance = _advancing(steps, substeps)
+    advance = advancing(steps, substeps)
     return jax.lax.while_loop(
         lambda one: one.place < steps.count * substeps,
         lambda one: advance(one)[0],
-        _begun(steps, state, mode),
+        begun(steps, state, mode),
     )
 
 
@@ -163,171 +136,23 @@ def _steps(model: Model, state, start, step, drive: DriveState, mode, events):
     if mode is None:
         duration = step * jnp.asarray(drive.angle.shape[0], dtype=float)
         mode = first_mode(known, system, start, state[:size], duration)
-    return _Steps(model, start, step, drive, known, size, events), mode
+    return Steps(model, start, step, drive, known, size, events), mode
 
 
-def _located(steps: _Steps, state, mode: Mode, substeps) -> Located:
-    """Locate the events of a piece; its parts end there and at the ends of steps."""
-    advance, count = _advancing(steps, substeps), steps.count * substeps
-    nothing = Part(
-        jnp.asarray(steps.count),
-        jnp.zeros_like(steps.step),
-        jnp.zeros_like(steps.step),
-        state,
-        mode,
-        jnp.zeros((steps.surfaces.number,), dtype=bool),
-        mode,
-    )
-    room = steps.count + steps.events
-    empty = jax.tree.map(lambda one: jnp.broadcast_to(one, (room, *one.shape)), nothing)
-
-    def further(carried):
-        place, begun, whole, number, parts = carried
-        after, part = advance(place)
-        first = jax.tree.map(lambda a, b: jnp.where(begun, a, b), whole, part)
-        whole = first._replace(
-            length=part.length + jnp.where(begun, whole.length, 0.0),
-            ends=part.ends,
-            after=part.after,
-        )
-        parts = jax.tree.map(lambda a, b: a.at[number].set(b), parts, whole)
-        ended = jnp.any(part.ends) | (after.place % substeps == 0)
-        return after, ~ended, whole, number + ended.astype(int), parts
-
-    last, *_, used, parts = jax.lax.while_loop(
-        lambda carried: carried[0].place < count,
-        further,
-        (_begun(steps, state, mode), False, nothing, jnp.asarray(0), empty),
-    )
-    # the unused parts are empty and follow the last step
-    other = jnp.arange(room)[:, None] >= used
-    final = Mode(*(jnp.where(other, a, b) for a, b in zip(last.mode, parts.mode)))
-    return Located(parts._replace(mode=final), last.state, last.mode)
-
-
-class _Place(NamedTuple):
-    """Progress of the search for events."""
-
-    place: Int[Array, ""]
-    """Number of finished substeps."""
-    passed: Float[Array, ""]
-    """Time since the end of the last finished substep (s)."""
-    state: Float[Array, " s"]
-    mode: Mode
-    events: Int[Array, ""]
-
-
-def _begun(steps: _Steps, state, mode: Mode) -> _Place:
-    zero = jnp.zeros((), dtype=int)
-    return _Place(zero, jnp.zeros_like(steps.step), state, mode, zero)
-
-
-def _advancing(steps: _Steps, substeps):
-    """Return the function that advances to the next event or end of a substep."""
-    short = steps.step / jnp.asarray(substeps, dtype=float)
-    count = steps.count * substeps
-
-    def advance(carried: _Place):
-        place, passed, x, mode, events = carried
-        # a finished piece waits for the others of its batch
-        inside = jnp.minimum(place, count - 1)
-        number = inside // substeps
-        within = jnp.asarray(inside - number * substeps, dtype=float)
-        offset = within * short + passed
-        left = short - passed
-        t = steps.begin(number) + offset
-        wanted = events < steps.events
-        found = _first_event(steps, number, t, x, mode, left, wanted)
-        part = Part(number, offset, found.length, x, mode, found.ends, found.mode)
-        event = jnp.any(found.ends)
-        passed = jnp.where(event, passed + found.length, 0.0)
-        place, events = place + (~event).astype(int), events + event.astype(int)
-        return _Place(place, passed, found.state, found.mode, events), part
-
-    return advance
-
-
-class _Reached(NamedTuple):
-    """The end of a part."""
-
-    length: Float[Array, ""]
-    state: Float[Array, " s"]
-    ends: Bool[Array, " k"]
-    mode: Mode
-
-
-def _first_event(steps: _Steps, number, t, x, mode: Mode, left, wanted) -> _Reached:
-    """Return the first event within the time `left`, or the motion at its end.
-
-    Among the distances that are negative at the end, the smallest one crosses zero at
-    the first event.
-    """
-    field, system_at = steps.field(number, mode), steps.in_mode(number, mode)
-    size = steps.size
-
-    def narrow(carried):
-        turn, a, low, b, high, kept, crossed, whole, _ = carried
-        trial = jnp.where(low > 0, (a * high - b * low) / (high - low), a)
-        trial = jnp.where(turn == 0, left, jnp.where(turn == 1, 0.0, trial))
-        there, _, _ = array_step(RK4, field, t, x, trial)
-        distances = switching_distances(system_at(t + trial), t + trial, there[:size])
-        whole = jnp.where(turn == 0, there, whole)
-        crossed = jnp.where(turn == 0, wanted & (distances < 0), crossed)
-        least = jnp.argmin(jnp.where(crossed, distances, jnp.inf))
-        value, last = distances[least], (least, trial, there)
-        beyond = (value < 0) & (turn != 1)
-        # Illinois method: if an end of the bracket is kept twice, its value is halved
-        low_kept = jnp.where((turn > 2) & beyond & (kept == 1), low / 2, low)
-        high_kept = jnp.where((turn > 2) & ~beyond & (kept == 2), high / 2, high)
-        return (
-            turn + 1,
-            jnp.where(beyond, a, trial),
-            jnp.where(beyond, low_kept, value),
-            jnp.where(beyond, trial, b),
-            jnp.where(beyond, value, high_kept),
-            jnp.where(beyond, 1, 2),
-            crossed,
-            whole,
-            last,
-        )
-
-    def more(carried):
-        turn, _, low, *_, crossed, _, _ = carried
-        begins = jnp.any(crossed) & ((turn < 2) | (low > 0)) & (turn < _SEARCH)
-        return (turn == 0) | begins
-
-    zero, none = jnp.zeros((), dtype=int), jnp.zeros_like(left)
-    surfaces = jnp.zeros((steps.surfaces.number,), dtype=bool)
-    begin = (zero, none, none, left, -jnp.ones_like(left), zero, surfaces, x)
-    *_, crossed, whole, (least, length, there) = jax.lax.while_loop(
-        more, narrow, (*begin, (zero, left, x))
-    )
-    found = jnp.any(crossed)
-    ends = found & (jnp.arange(steps.surfaces.number) == least)
-    at, y = t + length, there[:size]
-    system = system_at(at)
-    landed = state_after(system, at, y, ends)
-    new = mode_after(steps.surfaces, system, at, y, landed, ends)
-    there = there.at[:size].set(landed)
-    return _Reached(
-        jnp.where(found, length, left),
-        jnp.where(found, there, whole),
-        ends,
-        Mode(*(jnp.where(found, a, b) for a, b in zip(new, mode))),
-    )
-
-
-def _at_steps(parts: Part, steps: _Steps) -> Part:
+def _at_steps(parts: Part, steps: Steps) -> Part:
     """Return the part with which each step begins."""
     first = jnp.searchsorted(parts.number, jnp.arange(steps.count))
     return jax.tree.map(lambda one: one[first], parts)
 
 
-def _integrated(steps: _Steps, state, parts: Part):
+def _integrated(steps: Steps, state, parts: Part):
     """Return the state and the rate at the beginning of each step, and the state at the
     end, with derivatives.
+
+    An event moves in time by the implicit function theorem. The change of its time is
+    zero and only has derivatives, so the rates before and after need none.
     """
-    size = steps.size
+    size, still = steps.size, constant(steps)
 
     def advance(carried, part: Part):
         x, moved_by = carried
@@ -335,11 +160,13 @@ def _integrated(steps: _Steps, state, parts: Part):
         t = steps.begin(number) + part.offset
         field = steps.field(number, part.mode)
         there, _, rate = array_step(RK4, field, t, x, part.length)
-        t = t + part.length
-        before, system = field(t, there), steps.in_mode(number, part.mode)(t)
-        distances, slopes = distances_along(system, t, there[:size], before[:size])
+        t, fixed = t + part.length, jax.lax.stop_gradient(there)
+        before = still.field(number, part.mode)(t, fixed)
+        system = steps.in_mode(number, part.mode)(t)
+        distances = switching_distances(system, t, there[:size])
+        _, slopes = distances_along(constant(system), t, fixed[:size], before[:size])
         distance = jnp.sum(jnp.where(part.ends, distances, 0.0))
-        slope = jax.lax.stop_gradient(jnp.sum(jnp.where(part.ends, slopes, 0.0)))
+        slope = jnp.sum(jnp.where(part.ends, slopes, 0.0))
         # if the motion hardly approaches the surface, do not differentiate the event
         # time
         slope = jnp.where(slope < 0, slope, -jnp.inf)
@@ -351,7 +178,8 @@ def _integrated(steps: _Steps, state, parts: Part):
         moved_by = jnp.where(event, jnp.stack([later, 1.0]), kept)
         landed = state_after(system, t, (there + later * before)[:size], part.ends)
         moved = (there + later * before).at[:size].set(landed)
-        moved = moved - later * steps.field(number, part.after)(t, moved)
+        after = still.field(number, part.after)(t, jax.lax.stop_gradient(moved))
+        moved = moved - later * after
         return (jnp.where(event, moved, there), moved_by), (x, rate)
 
     carried = state, jnp.zeros(2)

@@ -1,0 +1,156 @@
+"""Integrate one piece of flight, with or without derivatives."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...hybrid import SwitchedSystem
+from ...hybrid.runge_kutta import array_step, RK4
+from ._constant import constant
+from ._model import augmented_field, DriveState, Model
+from ._readings import Nodes, readings
+from ._switched_steps import (
+    switched_end,
+    switched_flight,
+    switched_nodes,
+    SwitchedFlight,
+)
+
+
+class Flight(NamedTuple):
+    """The exact motion of a piece, without derivatives."""
+
+    states: Float[Array, "n1 s"]
+    """States at the ends of all steps, shape `(n + 1, s)`."""
+    rates: Float[Array, "n1 s"]
+    """Their rates, shape `(n + 1, s)`."""
+
+
+def exact_flight(
+    model: Model, state, start, step, drive: DriveState, substeps: Any = 1
+) -> Flight | SwitchedFlight:
+    """Return the motion of a piece without derivatives.
+
+    **Arguments:** as for `fly`.
+    """
+    if isinstance(model.system, SwitchedSystem):
+        return switched_flight(model, state, start, step, drive, substeps)
+    model, state = constant((model, state))
+    return Flight(*_nodes(model, state, start, step, drive, substeps))
+
+
+def fly_about(
+    flight: Flight | SwitchedFlight,
+    model: Model,
+    state,
+    start,
+    step,
+    drive: DriveState,
+) -> tuple[Float[Array, " s"], Nodes]:
+    """Return the values of an exact flight, with the derivatives of one that is
+    integrated without substeps: derivatives need far fewer digits and cost far more.
+    """
+    given = model, state, start, step, drive
+    if isinstance(flight, SwitchedFlight):
+        found = switched_nodes(*given, flight)
+    else:
+        found = _nodes(*given, 1)
+    states, rates = (
+        coarse + jax.lax.stop_gradient(better - coarse)
+        for better, coarse in zip((flight.states, flight.rates), found)
+    )
+    return states[-1], readings(model, states, rates, start, step, drive)
+
+
+def fly(
+    model: Model, state, start, step, drive: DriveState, substeps: Any = 1
+) -> tuple[Float[Array, " s"], Nodes]:
+    """Integrate one piece of flight by the classical Runge-Kutta method.
+
+    Each step is divided into `substeps` parts (a number or an integer array) for the
+    values, but not for the derivatives.
+
+    **Returns:** the state at the end of the piece `(n,)`, and its `Nodes`.
+    """
+    given = model, state, start, step, drive
+    if _is_one(substeps) and not isinstance(model.system, SwitchedSystem):
+        states, rates = _nodes(*given, 1)
+        return states[-1], readings(model, states, rates, start, step, drive)
+    return fly_about(exact_flight(*given, substeps), *given)
+
+
+def fly_exactly(
+    model: Model, state, start, step, drive: DriveState, substeps: Any = 1
+) -> tuple[Float[Array, " s"], Nodes]:
+    """Return the same as `fly`, without derivatives, by a smaller program."""
+    given = model, state, start, step, drive
+    flight = exact_flight(*given, substeps)
+    return flight.states[-1], readings(
+        model, flight.states, flight.rates, start, step, drive
+    )
+
+
+def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps):
+    """Return the state at the end of a piece, `(n,)`, without derivatives; `substeps`
+    may be traced.
+    """
+    if isinstance(model.system, SwitchedSystem):
+        return switched_end(model, state, start, step, drive, substeps)
+    return _nodes(model, state, start, step, drive, substeps)[0][-1]
+
+
+def _is_one(substeps) -> bool:
+    return isinstance(substeps, int) and substeps == 1
+
+
+def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
+    """Return the states at the ends of all steps `(n + 1, s)`, and their rates."""
+    part = step / jnp.asarray(substeps, dtype=float)
+
+    def advance(x, inputs):
+        number, here = inputs
+        t0 = start + number * step
+        system_at = model.during(t0 + step / 2, here)
+        if _is_one(substeps):
+            x1, k1 = runge_kutta(model, system_at, t0, x, step)
+            return x1, (x, k1)
+
+        def inner(k, x):
+            t = t0 + jnp.asarray(k, dtype=float) * part
+            return runge_kutta(model, system_at, t, x, part)[0]
+
+        k1 = augmented_field(model, system_at(t0), t0, x)
+        return jax.lax.fori_loop(0, substeps, inner, x), (x, k1)
+
+    count = drive.angle.shape[0]
+    numbers = jnp.arange(count, dtype=float)
+    end, (states, fields) = jax.lax.scan(advance, state, (numbers, drive))
+    t1 = start + count * step
+    final = DriveState(*(part[-1] for part in drive))
+    system = model.during(t1 - step / 2, final)(t1)
+    last = augmented_field(model, system, t1, end)
+    states = jnp.concatenate([states, end[None]])
+    return states, jnp.concatenate([fields, last[None]])
+
+
+def runge_kutta(model: Model, system_at, t, x, h):
+    """Take one classical Runge-Kutta step of length `h`.
+
+    Args:
+        model: The model.
+        system_at: The system as a function of time.
+        t: Time (s).
+        x: State, shape `(n,)`.
+        h: Step length (s).
+
+    Returns:
+        The state after the step, and the slope at its start.
+    """
+
+    def field(t, x):
+        return augmented_field(model, system_at(t), t, x)
+
+    after, _, first = array_step(RK4, field, t, x, h)
+    return after, first
