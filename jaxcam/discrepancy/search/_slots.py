@@ -22,6 +22,7 @@ from ..terms import (
     Gate,
     HiddenForce,
     more_faults,
+    prepared_terms,
     Primitive,
     Term,
     terms_of,
@@ -170,8 +171,7 @@ def roomy(
 
 def _with_splines(model: Model) -> Model:
     """Return the model with the splines of its functions precomputed."""
-    terms = tuple(term.prepared() for term in terms_of(model))
-    return eqx.tree_at(terms_of, model, terms)
+    return eqx.tree_at(terms_of, model, prepared_terms(terms_of(model)))
 
 
 def slots_of(problem: Problem, where: Where, gap: int = 0) -> list[str]:

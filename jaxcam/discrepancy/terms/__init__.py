@@ -11,7 +11,11 @@ from ._families import (
     Family as Family,
     free_basis as free_basis,
 )
-from ._free_function import FREE as FREE, FreeFunction as FreeFunction
+from ._free_function import (
+    FREE as FREE,
+    FreeFunction as FreeFunction,
+    prepared_terms as prepared_terms,
+)
 from ._hidden_elements import (
     HiddenElement as HiddenElement,
     Hysteresis as Hysteresis,

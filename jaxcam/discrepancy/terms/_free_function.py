@@ -6,6 +6,7 @@ harmonics of the drive's phase with the same spectrum. It is therefore linear in
 fitted coefficients, and a single number describes its smoothness.
 """
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -83,7 +84,7 @@ class FreeFunction(Term):
     softened: Float[Array, " n"] | None = None
     jump: Float[Array, ""] | None = None
 
-    def prepared(self):
+    def prepared(self) -> "FreeFunction":
         """Return the function with a precomputed cubic spline, which is cheap to
         evaluate.
 
@@ -94,29 +95,18 @@ class FreeFunction(Term):
         integration step: otherwise the derivative with respect to the place of an edge
         is zero in most steps, and much too large in the others.
         """
-        tables, jump = splines(
-            self.coefficients,
-            self.forms,
-            (self.rates, self.shifts),
-            (self.low, self.high),
-            self.jumping,
-            self.stride,
-        )
-        return eqx.tree_at(
-            lambda f: (f.table, f.softened, f.jump, f.gate),
-            self,
-            (*tables, jump, self._ready_gate()),
-            is_leaf=lambda x: x is None,
-        )
+        (found,) = prepared_terms((self,))
+        assert isinstance(found, FreeFunction)
+        return found
 
-    def _ready_gate(self):
+    def _own_gate(self):
         """Return the second form of a product with its own parameters, or `None`."""
         if self.gate is None:
             return None
         count = len(self.coefficients)
         own = (jnp.ones(()), *(self.coefficients[k] for k in GATE_PLACES))
         own += (jnp.zeros(()),) * (count - len(own))
-        return eqx.tree_at(lambda f: f.coefficients, self.gate, own).prepared()
+        return eqx.tree_at(lambda f: f.coefficients, self.gate, own)
 
     def exact(self):
         """Return the function with exact derivatives, not averaged over a step."""
@@ -271,3 +261,65 @@ FREE: dict[Where, type[FreeFunction]] = {
     Where.CONTACT: FreeSurface,
     Where.SENSOR: FreeSensor,
 }
+
+
+def prepared_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Return terms with their splines precomputed, all in one loop, which is compiled
+    once.
+    """
+    ready = [one if isinstance(one, FreeFunction) else one.prepared() for one in terms]
+    places = [k for k, one in enumerate(ready) if isinstance(one, FreeFunction)]
+    functions: list[Any] = [ready[k] for k in places]
+    gates = [one._own_gate() for one in functions]
+    every = [*functions, *(gate for gate in gates if gate is not None)]
+    found = iter(_with_tables(every))
+    functions = [next(found) for _ in functions]
+    for k, one, gate in zip(places, functions, gates):
+        inner = None if gate is None else next(found)
+        ready[k] = eqx.tree_at(lambda f: f.gate, one, inner, is_leaf=_is_none)
+    return tuple(ready)
+
+
+def _with_tables(functions: Sequence[FreeFunction]) -> list[FreeFunction]:
+    found: list[Any] = list(functions)
+    for softened in (False, True):
+        places = [
+            k for k, f in enumerate(functions) if (f.stride is not None) is softened
+        ]
+        if not places:
+            continue
+        group = [functions[k] for k in places]
+        most = max(len(f.coefficients) for f in group)
+        rows = [_arguments(f, most) for f in group]
+        stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *rows)
+        tables, jumps = jax.lax.map(lambda row: splines(*row), stacked)
+        for n, k in enumerate(places):
+            table, soft = (None if t is None else t[n] for t in tables)
+            found[k] = eqx.tree_at(
+                lambda f: (f.table, f.softened, f.jump),
+                functions[k],
+                (table, soft, jumps[n]),
+                is_leaf=_is_none,
+            )
+    return found
+
+
+def _arguments(function: FreeFunction, count: int):
+    """Return the arguments of `splines`, with so many sines that the function has
+    `count` coefficients; the last one is that of the jump.
+    """
+    *sines, jump = function.coefficients
+    more = count - len(function.coefficients)
+    waves = (jnp.pad(one, (0, more)) for one in (function.rates, function.shifts))
+    return (
+        jnp.stack([*sines, *[jnp.zeros(())] * more, jump]),
+        function.forms,
+        tuple(waves),
+        (function.low, function.high),
+        function.jumping,
+        function.stride,
+    )
+
+
+def _is_none(leaf) -> bool:
+    return leaf is None

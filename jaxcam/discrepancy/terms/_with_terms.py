@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from ...fitting import Turning
 from ...hybrid import HybridSystem, Wrapping
+from ._free_function import prepared_terms
 from ._term import Motion, Term
 from ._where import Where
 
@@ -38,8 +39,7 @@ class WithTerms(Wrapping):
         return self.base.speed  # pyright: ignore
 
     def prepared(self) -> "WithTerms":
-        terms = tuple(term.prepared() for term in self.terms)
-        new = self.base.prepared(), terms
+        new = self.base.prepared(), prepared_terms(self.terms)
         return eqx.tree_at(lambda s: (s.base, s.terms), self, new)
 
     def motion(self, t, state, coordinate: int = 0, field=None, moving=None) -> Motion:
