@@ -121,7 +121,8 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     args = problem.layout, of_record((point.values, every), 0), nodes, stride, shown
     found = each_record(record, len(columns.place), (_linear, args))
     moved = _motion(problem.layout, problem.pieces, point)
-    at_nodes = jax.tree.map(lambda part: np.asarray(part)[:, :, ::stride], moved)
+    # copies, because a view would keep the motion at all nodes
+    at_nodes = jax.tree.map(lambda a: np.asarray(a)[:, :, ::stride].copy(), moved)
     prior = prior_information(problem, columns, True)
     return Response(
         point,

@@ -13,7 +13,11 @@ from ._with_terms import WithTerms
 
 
 class SwitchedWithTerms(WithTerms, SwitchedWrapping):
-    """A switched system and terms added to each of its branches."""
+    """A switched system and terms added to each of its branches.
+
+    The sides of the surfaces must not change the rates of the coordinates, only those
+    of their velocities.
+    """
 
     base: SwitchedSystem
     """The system."""

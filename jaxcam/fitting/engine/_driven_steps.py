@@ -80,48 +80,18 @@ def input_in_steps(
     return DriveState(mean, slope, np.zeros(step.shape))
 
 
-# Positions within a step at which an input is compared with a line
-_INSIDE = np.linspace(0.125, 0.875, 7)
+def lines_in_parts(lines: DriveState, step, parts: int) -> DriveState:
+    """Return the lines that represent an input in each step, in equal parts of the
+    steps.
 
-
-class LineError(NamedTuple):
-    """The input minus the line that represents it in each step, `(r, k, n)` each: the
-    largest difference at the ends of the step, and the largest values of its integral
-    and its second integral over time within the step.
+    **Arguments:** the lines, `(r, k, n)` each; the length of the steps `(r, k)`; the
+    number of `parts`.
     """
-
-    ends: Numbers
-    once: Numbers
-    twice: Numbers
-
-
-def line_error(segments: Sequence[Segments], source: Input, edges: Edges) -> LineError:
-    """Compare each recording's input with the lines of `input_in_steps`."""
-    lines = input_in_steps(segments, source, edges)
-    begin, step = edges[..., :-1, None], np.diff(edges)[..., None]
-    after = step * _INSIDE
-    first = lines.angle[..., None] - lines.rate[..., None] * step / 2
-    second = lines.rate[..., None]
-    of_line = (
-        first * after + second * after**2 / 2,
-        first * after**2 / 2 + second * after**3 / 6,
-    )
-    rows = []
-    for row, part in enumerate(segments):
-        time, level = part.recording.time, part.recording[source.channel]
-        given = time, level, source.slopes(time, level)
-        once, twice = _integrals(*given, begin[row] + after[row])
-        once_before, twice_before = _integrals(*given, begin[row])
-        once, twice = (
-            once - once_before,
-            twice - twice_before - once_before * after[row],
-        )
-        rows.append((once - of_line[0][row], twice - of_line[1][row]))
-    once, twice = (np.max(np.abs(np.stack(part)), axis=-1) for part in zip(*rows))
-    at_ends = input_at(segments, source, edges).angle
-    low = np.abs(at_ends[..., :-1] - first[..., 0])
-    high = np.abs(at_ends[..., 1:] - (first + second * step)[..., 0])
-    return LineError(np.maximum(low, high), once, twice)
+    middle = (np.arange(parts) + 0.5) / parts - 0.5
+    along = np.asarray(step)[..., None, None] * middle
+    mean, slope = (np.asarray(one)[..., None] for one in (lines.angle, lines.rate))
+    found = np.broadcast_arrays(mean + slope * along, slope, 0.0)
+    return DriveState(*(one.reshape(*one.shape[:-2], -1) for one in found))
 
 
 def _integrals(time, level, slope, at):

@@ -20,7 +20,7 @@ from ._switched_steps import (
 
 
 class Flight(NamedTuple):
-    """The exact motion of a piece, without derivatives."""
+    """The motion of a piece with substeps, without derivatives."""
 
     states: Float[Array, "n1 s"]
     """States at the ends of all steps, shape `(n + 1, s)`."""
@@ -37,7 +37,8 @@ def exact_flight(
     """
     if isinstance(model.system, SwitchedSystem):
         return switched_flight(model, state, start, step, drive, substeps)
-    model, state = constant((model, state))
+    given = constant((model, state, start, step, drive))
+    model, state, start, step, drive = given
     return Flight(*_nodes(model, state, start, step, drive, substeps))
 
 
@@ -49,8 +50,10 @@ def fly_about(
     step,
     drive: DriveState,
 ) -> tuple[Float[Array, " s"], Nodes]:
-    """Return the values of an exact flight, with the derivatives of one that is
-    integrated without substeps: derivatives need far fewer digits and cost far more.
+    """Return the values of a flight, with the derivatives of one that is integrated
+    without substeps: derivatives need far fewer digits and cost far more.
+
+    **Returns:** as `fly`.
     """
     given = model, state, start, step, drive
     if isinstance(flight, SwitchedFlight):
@@ -81,7 +84,7 @@ def fly(
     return fly_about(exact_flight(*given, substeps), *given)
 
 
-def fly_exactly(
+def fly_without_derivatives(
     model: Model, state, start, step, drive: DriveState, substeps: Any = 1
 ) -> tuple[Float[Array, " s"], Nodes]:
     """Return the same as `fly`, without derivatives, by a smaller program."""

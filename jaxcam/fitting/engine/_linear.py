@@ -266,7 +266,9 @@ def _columns(function, *args):
 
 
 def flown(flying, model: Model, state, start, step, drive, place, *, substeps):
-    """Return the end of a piece and its samples; `flying` is `fly` or `fly_exactly`."""
+    """Return the end of a piece and its samples; `flying` is `fly`, or
+    `fly_without_derivatives`.
+    """
     end, nodes = flying(model, state, start, step, drive, substeps)
     along = _along(start, step, drive)
     return end, samples(model, nodes, calibration(model), start, step, place, along)

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from ...hybrid.programs import program
 from ._each_record import each_record, of_record
-from ._fly import fly, fly_exactly
+from ._fly import fly, fly_without_derivatives
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
@@ -133,7 +133,7 @@ def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
 @program
 def _predict_one(layout, pieces, extras, values, states):
     given = values, states, pieces.substeps
-    return _predicted_one(layout, pieces, extras, *given, fly_exactly)
+    return _predicted_one(layout, pieces, extras, *given, fly_without_derivatives)
 
 
 def _predicted_one(layout, pieces, extras, values, states, substeps, flying=fly):

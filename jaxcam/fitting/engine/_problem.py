@@ -77,6 +77,7 @@ from ._step_size import (
     enough_substeps,
     followed_by_cubics,
     followed_by_lines,
+    least_substeps,
     longest_flight,
     steps_for_filters,
     steps_of_samples,
@@ -202,7 +203,7 @@ class Problem:
             refuse_not_finite(layout, segments, pieces, point)
             if steps >= _MOST_STEPS:
                 break
-            if not followed_by_lines(layout, segments, pieces, point, steps):
+            if not followed_by_lines(layout, segments, pieces, point, _MOST_STEPS):
                 finest = steps_of_samples(segments, pieces, steps)
                 steps = min(2 * steps, finest, _MOST_STEPS)
                 continue
@@ -210,6 +211,7 @@ class Problem:
                 break
             steps = min(2 * steps, _MOST_STEPS)
         extras = joint_sharpness(layout, pieces, point, guess)
+        pieces = least_substeps(model, segments, pieces)
         pieces = enough_substeps(layout, pieces, extras, point, longest_flight(cuts))
         pieces = jax.tree.map(jnp.asarray, pieces)
         point = own_states(layout, pieces, extras, point)

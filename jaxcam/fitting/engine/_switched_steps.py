@@ -25,7 +25,7 @@ EVENTS = 8
 
 
 class SwitchedFlight(NamedTuple):
-    """The exact motion of a piece."""
+    """The motion of a piece with substeps, without derivatives, and its events."""
 
     states: Float[Array, "n1 s"]
     """States at the ends of all steps, shape `(n + 1, s)`."""
@@ -50,7 +50,8 @@ def switched_flight(
     **Arguments:** as for `fly`, the `mode` at the start (default: that of a motion that
     starts there), and the maximum number of events.
     """
-    model, state, mode = constant((model, state, mode))
+    given = constant((model, state, start, step, drive, mode))
+    model, state, start, step, drive, mode = given
     steps, mode = _steps(model, state, start, step, drive, mode, events)
     found = located(steps, state, mode, substeps)
     first = _at_steps(found.parts, steps)
@@ -72,7 +73,7 @@ def switched_nodes(
 ) -> tuple[Float[Array, "n1 s"], Float[Array, "n1 s"]]:
     """Return the states at the ends of all steps, and their rates, with derivatives.
 
-    **Arguments:** as for `fly`, and the exact motion of the piece.
+    **Arguments:** as for `fly`, and the motion of the piece with substeps.
     """
     steps, _ = _steps(model, state, start, step, drive, flight.located.mode, EVENTS)
     states, rates, end = _integrated(steps, state, flight.located.parts)
@@ -176,8 +177,10 @@ def _integrated(steps: Steps, state, parts: Part):
         later = jnp.where(at_once & (moved_by[1] > 0), moved_by[0], later)
         kept = jnp.where(at_once, moved_by, 0.0)
         moved_by = jnp.where(event, jnp.stack([later, 1.0]), kept)
-        landed = state_after(system, t, (there + later * before)[:size], part.ends)
-        moved = (there + later * before).at[:size].set(landed)
+        moved, at = there + later * before, t + later
+        system = steps.in_mode(number, part.mode)(at)
+        landed = state_after(system, at, moved[:size], part.ends)
+        moved = moved.at[:size].set(landed)
         after = still.field(number, part.after)(t, jax.lax.stop_gradient(moved))
         moved = moved - later * after
         return (jnp.where(event, moved, there), moved_by), (x, rate)
