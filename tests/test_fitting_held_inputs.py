@@ -158,9 +158,9 @@ class Actuated(Cart):
 
 
 def test_an_input_behind_an_actuator_is_followed():
-    """The input reaches the position through three integrations: the steps are so short
-    that lines change the position by less than the noise times the bound, which a
-    simulation with a step for each sample shows."""
+    """The input reaches the position through three integrations: at the end of every
+    piece, the position is within 0.035 noises of the closed form, the bound for 2000
+    samples. Steps that only the cubics require are off by up to 0.16 noises."""
     rng = np.random.default_rng(3)
     force = np.sign(rng.standard_normal(2001))
     decay, x, states = np.exp(-_INTERVAL / 0.02), np.zeros(3), []
@@ -180,11 +180,11 @@ def test_an_input_behind_an_actuator_is_followed():
     problem = recorded(Actuated(), exact[:, 0], force, "hold", noise := 1e-6)
     pieces, part = problem.pieces, problem.pieces.flown
     model = problem.layout.at(problem.start.values[0])
-    for k in np.flatnonzero(np.asarray(pieces.exists)[0])[:4]:
+    for k in np.flatnonzero(np.asarray(pieces.exists)[0]):
         start, h = float(part.start[0, k]), float(part.step[0, k])
         first = int(round(start / _INTERVAL))
         last = int(round((start + pieces.steps * h) / _INTERVAL))
         assert abs(first * _INTERVAL - start) < 1e-9
         drive = jax.tree.map(lambda one: jnp.asarray(one[0, k]), pieces.drive)
         end, _ = fly(model, jnp.asarray(exact[first]), start, h, drive, 4)
-        assert abs(float(end[0]) - exact[last, 0]) < 0.1 * noise
+        assert abs(float(end[0]) - exact[last, 0]) < 0.035 * noise

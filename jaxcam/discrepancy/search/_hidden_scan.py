@@ -130,7 +130,7 @@ class _Chain:
     def __init__(self, problem: Problem, response: Response, driven: Driven):
         self.response, self.driven = response, driven
         by_motion = ByMotion([0.0] * DIRECT, jnp.asarray(driven.middle))
-        self.direct = forces_at_nodes(problem, response, [by_motion])
+        self.direct = forces_at_nodes(response, [by_motion])
         self.size = len(response.prior) + DIRECT
 
     def gains(self, kind: Kind, cells: Sequence[Sequence[float]]):

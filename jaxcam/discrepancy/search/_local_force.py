@@ -152,7 +152,7 @@ def force_blocks(
     """
     strengths = [p for k, term in enumerate(terms) for p in term.parameters(k)]
     scale = np.array([p.scale for p in strengths], dtype=float)
-    forces = forces_at_nodes(problem, response, terms) * scale
+    forces = forces_at_nodes(response, terms) * scale
     if decoy:
         forces = _in_reverse(response, forces)
     return blocks_at_nodes(
@@ -214,7 +214,7 @@ def _in_reverse(
 
 
 def forces_at_nodes(
-    problem: Problem, response: Response, terms: Sequence[Term]
+    response: Response, terms: Sequence[Term]
 ) -> Float[np.ndarray, "r k l p"]:
     """Return the acceleration per unit of each strength of the given terms, at every
     node.

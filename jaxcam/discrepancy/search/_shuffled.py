@@ -104,7 +104,7 @@ def _functions(nodes: Nodes, found: Missing, one: Free) -> Float[np.ndarray, "r 
     of a product have its second form as a factor.
     """
     term = free_term(one.family, "new")
-    forces = forces_at_nodes(nodes.problem, nodes.response, [term])
+    forces = forces_at_nodes(nodes.response, [term])
     if one.gate is None or one.primitive is None:
         return forces
     own = [found.fit[name].value for name in one.coefficients]

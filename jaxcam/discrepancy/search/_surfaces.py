@@ -71,7 +71,7 @@ class Nodes(NamedTuple):
     @classmethod
     def of(cls, problem: Problem, response: Response, heat: float) -> "Nodes":
         """Return the arguments at the nodes of a response."""
-        every = forces_at_nodes(problem, response, [_Arguments()])
+        every = forces_at_nodes(response, [_Arguments()])
         along = {name: every[..., k] for k, name in enumerate(_AT_NODES)}
         return cls(problem, response, heat, along)
 

@@ -1,6 +1,6 @@
 """Integrate one piece of flight, with or without derivatives."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,27 +11,13 @@ from ...hybrid.runge_kutta import array_step, RK4
 from ._constant import constant
 from ._model import augmented_field, DriveState, Model
 from ._readings import Nodes, readings
-from ._switched_steps import (
-    switched_end,
-    switched_flight,
-    switched_nodes,
-    SwitchedFlight,
-)
+from ._switched_steps import Flight, switched_end, switched_flight, switched_nodes
 
 
-class Flight(NamedTuple):
-    """The motion of a piece with substeps, without derivatives."""
-
-    states: Float[Array, "n1 s"]
-    """States at the ends of all steps, shape `(n + 1, s)`."""
-    rates: Float[Array, "n1 s"]
-    """Their rates, shape `(n + 1, s)`."""
-
-
-def exact_flight(
+def flight_with_substeps(
     model: Model, state, start, step, drive: DriveState, substeps: Any = 1
-) -> Flight | SwitchedFlight:
-    """Return the motion of a piece without derivatives.
+) -> Flight:
+    """Return the motion of a piece with substeps, without derivatives.
 
     **Arguments:** as for `fly`.
     """
@@ -39,11 +25,12 @@ def exact_flight(
         return switched_flight(model, state, start, step, drive, substeps)
     given = constant((model, state, start, step, drive))
     model, state, start, step, drive = given
-    return Flight(*_nodes(model, state, start, step, drive, substeps))
+    states, rates = _nodes(model, state, start, step, drive, substeps)
+    return Flight(states, rates)
 
 
 def fly_about(
-    flight: Flight | SwitchedFlight,
+    flight: Flight,
     model: Model,
     state,
     start,
@@ -56,7 +43,7 @@ def fly_about(
     **Returns:** as `fly`.
     """
     given = model, state, start, step, drive
-    if isinstance(flight, SwitchedFlight):
+    if flight.located is not None:
         found = switched_nodes(*given, flight)
     else:
         found = _nodes(*given, 1)
@@ -81,7 +68,7 @@ def fly(
     if _is_one(substeps) and not isinstance(model.system, SwitchedSystem):
         states, rates = _nodes(*given, 1)
         return states[-1], readings(model, states, rates, start, step, drive)
-    return fly_about(exact_flight(*given, substeps), *given)
+    return fly_about(flight_with_substeps(*given, substeps), *given)
 
 
 def fly_without_derivatives(
@@ -89,7 +76,7 @@ def fly_without_derivatives(
 ) -> tuple[Float[Array, " s"], Nodes]:
     """Return the same as `fly`, without derivatives, by a smaller program."""
     given = model, state, start, step, drive
-    flight = exact_flight(*given, substeps)
+    flight = flight_with_substeps(*given, substeps)
     return flight.states[-1], readings(
         model, flight.states, flight.rates, start, step, drive
     )

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ._fly import exact_flight, fly_about
+from ._fly import flight_with_substeps, fly_about
 from ._likelihood import score_all
 from ._model import Model
 from ._pieces import FLIGHT, IMPACT, Pieces
@@ -170,12 +170,12 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
     def piece(state, start, step, drive, place, value, weight):
         # outside the derivatives, because those of a loop that locates events take
         # long to compile
-        begun = state, start, step, drive
-        exact = exact_flight(model_at(origin, start, step), *begun, pieces.substeps)
+        given = state, start, step, drive, pieces.substeps
+        fine = flight_with_substeps(model_at(origin, start, step), *given)
 
         def flight(state, change):
             model = model_at(change, start, step)
-            end, nodes = fly_about(exact, model, state, start, step, drive)
+            end, nodes = fly_about(fine, model, state, start, step, drive)
             return end, (nodes, calibration(model))
 
         def sampled(model, known):

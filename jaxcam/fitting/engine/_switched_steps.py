@@ -24,15 +24,15 @@ from ._modes import distances_along, first_mode, Mode, state_after, surfaces_in
 EVENTS = 8
 
 
-class SwitchedFlight(NamedTuple):
-    """The motion of a piece with substeps, without derivatives, and its events."""
+class Flight(NamedTuple):
+    """The motion of a piece with substeps, without derivatives."""
 
     states: Float[Array, "n1 s"]
     """States at the ends of all steps, shape `(n + 1, s)`."""
     rates: Float[Array, "n1 s"]
     """Their rates, shape `(n + 1, s)`."""
-    located: Located
-    """The events."""
+    located: Located | None = None
+    """The events of a switched system."""
 
 
 def switched_flight(
@@ -44,7 +44,7 @@ def switched_flight(
     substeps,
     mode: Mode | None = None,
     events: int = EVENTS,
-) -> SwitchedFlight:
+) -> Flight:
     """Locate the events of a piece, without derivatives.
 
     **Arguments:** as for `fly`, the `mode` at the start (default: that of a motion that
@@ -61,7 +61,7 @@ def switched_flight(
 
     rates = jax.vmap(rate)(jnp.arange(steps.count), first.state, first.mode)
     last = _last_rate(steps, found, found.end)
-    return SwitchedFlight(
+    return Flight(
         jnp.concatenate([first.state, found.end[None]]),
         jnp.concatenate([rates, last[None]]),
         found,
@@ -69,16 +69,18 @@ def switched_flight(
 
 
 def switched_nodes(
-    model: Model, state, start, step, drive: DriveState, flight: SwitchedFlight
+    model: Model, state, start, step, drive: DriveState, flight: Flight
 ) -> tuple[Float[Array, "n1 s"], Float[Array, "n1 s"]]:
     """Return the states at the ends of all steps, and their rates, with derivatives.
 
     **Arguments:** as for `fly`, and the motion of the piece with substeps.
     """
-    steps, _ = _steps(model, state, start, step, drive, flight.located.mode, EVENTS)
-    states, rates, end = _integrated(steps, state, flight.located.parts)
+    found = flight.located
+    assert found is not None
+    steps, _ = _steps(model, state, start, step, drive, found.mode, EVENTS)
+    states, rates, end = _integrated(steps, state, found.parts)
     states = jnp.concatenate([states, end[None]])
-    last = _last_rate(steps, flight.located, states[-1])
+    last = _last_rate(steps, found, states[-1])
     return states, jnp.concatenate([rates, last[None]])
 
 
@@ -93,6 +95,7 @@ def switched_steps(
     given = model, state, start, step, drive
     flight = switched_flight(*given, 1, mode, events)
     states, rates = switched_nodes(*given, flight)
+    assert flight.located is not None
     return states[-1], rates[0], flight.located
 
 
