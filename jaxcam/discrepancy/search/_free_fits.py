@@ -106,7 +106,8 @@ class FreeFits:
                 stop=self._stop(problem.samples, heat, beaten),
             )
             point, before, heat = found.point, heat, heat_of(found)
-            if not math.isfinite(found.cost):
+            late = found.iterations >= policy.late_attempts // 2
+            if not math.isfinite(found.cost) or late and not found.cost < beaten:
                 break
             settled = max(heat, before) < policy.prior_settled * min(heat, before)
             if functions and not last:

@@ -235,7 +235,7 @@ class FreeSearch:
                     break
                 said = spelled(lead.label)
                 self.progress(f"fitting {said}", None)
-                trial = self._with(problem, found, lead)
+                trial = self._with(problem, found, lead, found.score)
                 if trial is not None and not apart:
                     self.tried.append(trial)
                 elif trial is not None and leads is self.first:
@@ -299,7 +299,13 @@ class FreeSearch:
             least = max(least, more / heat_of(found.fit))
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
 
-    def _with(self, problem: Problem, found: Missing, lead: Lead) -> Missing | None:
+    def _with(
+        self, problem: Problem, found: Missing, lead: Lead, beaten: float = math.inf
+    ) -> Missing | None:
+        """Return a fit with a candidate, or `None` if it fails.
+
+        **Arguments:** a fit whose cost does not fall below `beaten` may be stopped.
+        """
         functions, names = found.functions, found.names
         point, trial = found.fit.point, None
         if lead.promise is not None:
@@ -317,10 +323,12 @@ class FreeSearch:
             names = names | {lead.name}
         if self._shows_apart(lead):
             # a force is almost linear if impacts do not connect the pieces
-            trial = self.fits.fitted(Subset(self.apart, functions, names), point)
+            subset = Subset(self.apart, functions, names)
+            trial = self.fits.fitted(subset, point, beaten=beaten)
             point, functions = trial.fit.point, trial.functions
-        if trial is None or problem is not self.apart:
-            trial = self.fits.fitted(Subset(problem, functions, names), point)
+        if trial is None or problem is not self.apart and trial.fit.cost < beaten:
+            subset = Subset(problem, functions, names)
+            trial = self.fits.fitted(subset, point, beaten=beaten)
         return trial if math.isfinite(trial.score) else None
 
     def _swapped(self, found: Missing) -> Missing:
@@ -338,8 +346,12 @@ class FreeSearch:
             names = rest.names | {rival}
             problems = (self.apart, self.problem)
             for problem in problems[1:] if self.roughly else problems:
-                trial = self.fits.fitted(Subset(problem, rest.functions, names), point)
+                # disconnected pieces cost less than connected ones
+                subset = Subset(problem, rest.functions, names)
+                trial = self.fits.fitted(subset, point, beaten=found.score)
                 point = trial.fit.point
+                if not trial.fit.cost < found.score:
+                    break
             if trial.score < found.score:
                 return self._swapped(trial)
         return found

@@ -10,6 +10,10 @@ from collections.abc import Callable, Sequence
 from ..policy import Policy
 
 
+# Factor by which a successful step usually reduces a cost that is far too high
+_A_STEP = 10.0
+
+
 def given_up(
     samples: int,
     policy: Policy,
@@ -18,8 +22,9 @@ def given_up(
 ) -> Callable[[Sequence[float]], bool]:
     """Return a callback that tells `jaxcam.fitting.fit` when to stop.
 
-    A fit is late if its cost is still above a given value after a number of attempts.
-    It crawls if it explains little and its last steps took many attempts and gained
+    A fit is late if its cost is still above a given value after a number of attempts,
+    or, after half that number, so far above it that it cannot fall below it in time. It
+    crawls if it explains little and its last steps took many attempts and gained
     very little.
 
     **Arguments:** the number of samples; the policy; the cost that a fit must fall
@@ -28,10 +33,22 @@ def given_up(
     """
 
     def stop(costs: Sequence[float]) -> bool:
-        late = len(costs) > policy.late_attempts and costs[-1] > beaten
+        late = falls_late(costs, beaten, policy)
         return late or (costs[-1] > decides and crawls(costs, samples, policy))
 
     return stop
+
+
+def falls_late(costs: Sequence[float], beaten: float, policy: Policy) -> bool:
+    """Return whether a fit is late: it will not fall below the cost `beaten` in the
+    allowed number of attempts.
+
+    **Arguments:** the costs at the start and after each attempt; the cost; the policy.
+    """
+    left = policy.late_attempts + 1 - len(costs)
+    if 2 * left > policy.late_attempts:
+        return False
+    return costs[-1] > beaten * _A_STEP ** max(left, 0)
 
 
 def crawls(costs: Sequence[float], samples: int, policy: Policy) -> bool:

@@ -116,7 +116,8 @@ class LeftOut:
             least = allowed(found)
             if self.predicted_loss(found, one) > self.policy.clear_gain * least:
                 continue
-            less = self.fits.fitted(*self.subset(found, one))
+            most = found.score + least
+            less = self.fits.fitted(*self.subset(found, one), beaten=most)
             if less.score - found.score < least:
                 found = less
         return found

@@ -2,13 +2,15 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ...hybrid.caches import Cache
 from ...hybrid.programs import program
-from ._each_record import each_record, of_record
+from ._each_record import each_record, kinds, of_record
 from ._fly import fly, fly_without_derivatives
 from ._layout import Layout
 from ._likelihood import score_all
@@ -25,6 +27,11 @@ from ._linear import (
 )
 from ._pieces import Pieces
 from ._seen_directly import shows_directly
+
+
+# The last linearisations: a fit often begins where another ended, and the evidence for
+# a fit is assessed at its end
+_LATEST = Cache(12)
 
 
 class Point(NamedTuple):
@@ -80,6 +87,8 @@ def assemble(
 ) -> tuple[Blocks, Costs]:
     """Linearise about a point; recordings are distributed over the cores.
 
+    The last results are kept: if only the scales differ, they are converted.
+
     Args:
         layout: The location of the parameters in the model.
         pieces: The pieces of all recordings.
@@ -92,8 +101,21 @@ def assemble(
         Normal equations and costs.
     """
 
-    shown = shows_directly(layout, pieces, columns, scales)
+    about = extras, point, columns
+    given = layout, about, np.asarray(scales) == 0
+    values = [np.asarray(leaf) for leaf in jax.tree.leaves(eqx.filter(given, _shaped))]
+    # the pieces are kept, so that no other object can have their identity
+    key = kinds(given), id(pieces), *(value.tobytes() for value in values)
+    found = _LATEST.find(key)
+    if found is None:
+        found = pieces, scales, _assembled(layout, pieces, *about, scales)
+        _LATEST.keep(key, found)
+    _, unit, (blocks, costs) = found
+    return _rescaled(blocks, unit, scales), costs
 
+
+def _assembled(layout, pieces, extras, point, columns, scales):
+    shown = shows_directly(layout, pieces, columns, scales)
     every = pieces, extras, point.states, columns, scales
 
     def record(row):
@@ -102,6 +124,23 @@ def assemble(
 
     args = layout, of_record((point.values, every), 0), shown
     return each_record(record, columns.shape[0], (assemble_one, args))
+
+
+def _shaped(leaf) -> bool:
+    return hasattr(leaf, "shape")
+
+
+def _rescaled(blocks: Blocks, before, after) -> Blocks:
+    """Return normal equations with other scales of the parameters, `(r, m)` each."""
+    before, after = np.asarray(before), np.asarray(after)
+    if np.array_equal(before, after):
+        return blocks
+    unit = after / np.where(before == 0, 1.0, before)
+    return blocks._replace(
+        sp=jnp.asarray(np.asarray(blocks.sp) * unit[:, None, None]),
+        pp=jnp.asarray(np.asarray(blocks.pp) * unit[:, :, None] * unit[:, None]),
+        p=jnp.asarray(np.asarray(blocks.p) * unit),
+    )
 
 
 @program
