@@ -20,12 +20,12 @@ from .engine import (
 )
 
 
-# The iteration ends if the predicted gain in twice the log-likelihood is below this
-# value
-_PROMISE = 1e-3
-# Largest gain predicted for an undamped step at an optimum: such a step changes no
-# parameter by more than a tenth of its standard error
-_GRADIENT = 1e-2
+TOLERANCE = 1e-3
+"""Predicted decrease of the cost below which an iteration ends."""
+# Largest decrease predicted for an undamped step at an optimum, as a multiple of the
+# tolerance: with the default tolerance, such a step changes no parameter by more than a
+# tenth of its standard error
+_UNDAMPED = 10.0
 # Maximum number of corrections before a step is accepted or rejected
 _CORRECTIONS = 3
 # Each correction must reduce the excess cost to less than this fraction of its previous
@@ -94,22 +94,27 @@ class Objective:
 
 
 def descend(
-    objective: Objective, point: Point, iterations: int, stop=None, progress=None
+    objective: Objective,
+    point: Point,
+    iterations: int,
+    stop=None,
+    progress=None,
+    tolerance: float = TOLERANCE,
 ) -> Descent:
     """Iterate damped scoring from a point to an optimum near it.
 
-    **Arguments:** `iterations`, `stop` and `progress` are those of `fit`.
+    **Arguments:** `iterations`, `stop`, `progress` and `tolerance` are those of `fit`.
     """
     best, damping = objective.at(point), Damping()
     so_far, optimal, count = [best.cost], False, 0
     for count in range(1, iterations + 1):
         end, promise = objective.step(best, damping.value)
         known = bool(np.isfinite(promise))
-        if known and promise < _PROMISE:
+        if known and promise < tolerance:
             # in a valley, a damped step always predicts little gain; the undamped step
             # must predict little gain as well
             _, whole = objective.step(best, LEAST_DAMPING)
-            if not whole > _GRADIENT or damping.value <= LEAST_DAMPING:
+            if not whole > _UNDAMPED * tolerance or damping.value <= LEAST_DAMPING:
                 optimal, message = True, "The optimum was reached."
                 break
             damping = damping.in_a_valley()

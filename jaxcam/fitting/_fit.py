@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._descend import descend, Descent, Objective
+from ._descend import descend, Descent, Objective, TOLERANCE
 from ._doubts import poor_fit
 from ._fit_result import finish, Fit
 from .engine import (
@@ -41,6 +41,7 @@ def fit(
     iterations: int = _ITERATIONS,
     stop: Callable[[Sequence[float]], bool] | None = None,
     progress: Callable[[int, float], None] | None = None,
+    tolerance: float = TOLERANCE,
 ) -> Fit:
     """Fit the free parameters of a problem.
 
@@ -60,6 +61,9 @@ def fit(
             are first fitted to convergence with relaxed continuity conditions between
             pieces; only the costs of the subsequent iterations are passed.
         progress: Called with the iteration number and the cost.
+        tolerance: Decrease of the cost (twice the log-likelihood) below which a further
+            step is not worthwhile: the iteration ends if the predicted decrease is
+            smaller.
 
     Returns:
         A [`jaxcam.fitting.Fit`][]. Its `converged` is true only if the fit is at an
@@ -97,12 +101,12 @@ def fit(
 
     long = problem.longest_flight > _LONG and fresh and not already_loose(extras)
     first = loosely() if long else point
-    found = descend(objective, first, iterations, stop, progress)
+    found = descend(objective, first, iterations, stop, progress, tolerance)
     # if the cost is far above the noise, there may be a better optimum; a caller who
     # gives `stop` or `start` has to search for it
     if fresh and stop is None and iterations > 0 and _far(problem, found, weights):
         for other in _other_starts(objective, point, loosely):
-            again = descend(objective, other, iterations)
+            again = descend(objective, other, iterations, tolerance=tolerance)
             if np.isfinite(again.cost) and not again.cost >= found.cost:
                 found = again
             if not _far(problem, found, weights):

@@ -22,6 +22,9 @@ from ._slots import filled, Free, Part
 # Change, as a fraction of the allowed step, below which element parameters have
 # converged
 _SETTLED = 0.02
+# Predicted decrease of the cost, in units of its scale, below which a fit ends: far
+# less than any decision depends on
+_TOLERANCE = 0.1
 
 
 class Missing(NamedTuple):
@@ -104,6 +107,7 @@ class FreeFits:
                 start=point,
                 iterations=iterations or policy.quick_iterations,
                 stop=self._stop(problem.samples, heat, beaten),
+                tolerance=_TOLERANCE * heat,
             )
             point, before, heat = found.point, heat, heat_of(found)
             late = found.iterations >= policy.late_attempts // 2

@@ -332,29 +332,8 @@ class FreeSearch:
         return trial if math.isfinite(trial.score) else None
 
     def _swapped(self, found: Missing) -> Missing:
-        """Replace earlier functions by terms that explain more.
-
-        A function found while the fit is poor may represent two effects.
-        """
-        for out in (*found.functions, *sorted(found.names)):
-            rest, point = self.left_out.subset(found, out)
-            most = self.policy.lead_bic * heat_of(found.fit) + self._small(found)
-            rival = self.left_out.replacement(found, out, most)
-            if rival is None:
-                continue
-            self.progress(f"fitting {spelled(rival)}", None)
-            names = rest.names | {rival}
-            problems = (self.apart, self.problem)
-            for problem in problems[1:] if self.roughly else problems:
-                # disconnected pieces cost less than connected ones
-                subset = Subset(problem, rest.functions, names)
-                trial = self.fits.fitted(subset, point, beaten=found.score)
-                point = trial.fit.point
-                if not trial.fit.cost < found.score:
-                    break
-            if trial.score < found.score:
-                return self._swapped(trial)
-        return found
+        problems = (self.problem,) if self.roughly else (self.apart, self.problem)
+        return self.left_out.swapped(found, problems, self._small, self.progress)
 
     def shuffled(self, found: Missing, seed: int) -> tuple[Shuffled, ...]:
         """Return the gains of the knockoffs of all forces."""

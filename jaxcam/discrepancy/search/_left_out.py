@@ -8,9 +8,9 @@ import numpy as np
 from ...fitting import Problem
 from ...fitting.engine import Point
 from ..policy import Policy
-from ..terms import Term
+from ..terms import spelled, Term
 from ._blocks import Blocks, blocks_of, values_of
-from ._free_fits import FreeFits, Missing, Subset
+from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._gains import added_gain, gain
 from ._slots import emptied, filled, Part
 
@@ -120,4 +120,37 @@ class LeftOut:
             less = self.fits.fitted(*self.subset(found, one), beaten=most)
             if less.score - found.score < least:
                 found = less
+        return found
+
+    def swapped(
+        self,
+        found: Missing,
+        problems: Sequence[Problem],
+        small: Callable[[Missing], float],
+        progress,
+    ) -> Missing:
+        """Replace earlier functions by terms that explain more.
+
+        A function found while the fit is poor may represent two effects.
+
+        **Arguments:** the fit; the problems to fit in turn, the last of which decides;
+        `small(fit)`, the tolerated increase in cost.
+        """
+        for out in (*found.functions, *sorted(found.names)):
+            rest, point = self.subset(found, out)
+            most = self.policy.lead_bic * heat_of(found.fit) + small(found)
+            rival = self.replacement(found, out, most)
+            if rival is None:
+                continue
+            progress(f"fitting {spelled(rival)}", None)
+            names, trial = rest.names | {rival}, None
+            for problem in problems:
+                subset = Subset(problem, rest.functions, names)
+                trial = self.fits.fitted(subset, point, beaten=found.score)
+                point = trial.fit.point
+                # disconnected pieces cost less than connected ones
+                if not trial.fit.cost < found.score:
+                    break
+            if trial is not None and trial.score < found.score:
+                return self.swapped(trial, problems, small, progress)
         return found
