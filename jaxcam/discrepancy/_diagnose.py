@@ -201,8 +201,8 @@ class _Rig:
 
 
 class _Answer(NamedTuple):
-    """A diagnosis, and the fits with functions, the best first, from which a search in
-    some of the same recordings may start.
+    """A diagnosis, and the fits with functions, the best first, from which a further
+    search in the same recordings, or in some of them, may start.
     """
 
     diagnosis: Diagnosis
@@ -258,6 +258,9 @@ def _answered(
         rough = _roughly(question, bare, keep, conditions, earlier)
     if rough is not None and not rough.choice.explained(policy):
         return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
+    if rough is not None:
+        # their fits to connected pieces may leave only noise
+        earlier = (*rough.choice.functions, *earlier)
     if rough is not None and rough.choice.named.best.names:
         # the physics was found, so that the stated noise can be used
         found = rough.choice.named.best

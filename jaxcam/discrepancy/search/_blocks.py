@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Array, Float, Int
 
 from ...fitting import Fit, Problem
 from ...fitting.engine import (
@@ -160,3 +160,23 @@ def values_of(found: Fit, blocks: Blocks) -> np.ndarray:
     all_names = found.problem.names
     columns = [all_names.index(name) for name in blocks.names]
     return np.asarray(found.point.values)[blocks.owner, columns] / blocks.scale
+
+
+def moved(
+    problem: Problem,
+    blocks: Blocks,
+    values: Float[Array, "r q"],
+    rows: Int[np.ndarray, " m"],
+    step: Float[np.ndarray, " m"],
+) -> Float[Array, "r q"]:
+    """Return parameter values after a step of some parameters of the blocks, in units
+    of their scales.
+    """
+    after = np.array(values)
+    for row, change in zip(rows, step * blocks.scale[rows]):
+        name = blocks.names[row]
+        # a parameter with a value for each recording has a row for each
+        shared = blocks.names.count(name) == 1
+        owner = slice(None) if shared else blocks.owner[row]
+        after[owner, problem.names.index(name)] += change
+    return jnp.asarray(after)

@@ -1,4 +1,6 @@
-"""Fit the functions that were found in more recordings to some of them alone."""
+"""Fit the functions that an earlier search found, with looser joints or in more
+recordings.
+"""
 
 import dataclasses
 import math
@@ -52,10 +54,10 @@ def _divided_alike(one: Problem, other: Problem, rows: Sequence[int]) -> bool:
 
 
 def refitted(search: FreeSearch, earlier: Sequence[Missing]) -> Missing | None:
-    """Fit functions and terms found in more recordings to those of a search.
+    """Fit functions and terms of an earlier search to the problem of another search.
 
-    All fits count as tried by the search, because recordings left out may have affected
-    their order.
+    All fits count as tried by the search, because model errors that were allowed for or
+    recordings left out may have affected their order.
 
     **Returns:** the fit with the most evidence, or `None` if there is none.
     """

@@ -9,9 +9,9 @@ from ...fitting import Problem
 from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import spelled, Term
-from ._blocks import Blocks, blocks_of, values_of
+from ._blocks import Blocks, blocks_of, moved, values_of
 from ._free_fits import FreeFits, heat_of, Missing, Subset
-from ._gains import added_gain, gain
+from ._gains import added_gain, gain, newton_step
 from ._slots import emptied, filled, Part
 
 
@@ -82,9 +82,11 @@ class LeftOut:
         moved = score - information @ step
         return Without(worse, blocks, information, moved, blocks.rows(kept))
 
-    def replacement(self, found: Missing, out: Part | str, most: float) -> str | None:
-        """Return the name of the term that best replaces a function or term, according
-        to the quadratic likelihood about the fit.
+    def replacement(
+        self, found: Missing, out: Part | str, most: float
+    ) -> tuple[str, Point] | None:
+        """Return the term that best replaces a function or term, according to the
+        quadratic likelihood about the fit, and a start for its fit.
 
         **Arguments:** `most`: the largest increase in cost with the replacement; `None`
         is returned if every term would increase it more.
@@ -96,13 +98,18 @@ class LeftOut:
         least = self.policy.distinct_information
         without = self.quadratic(found, out, every)
         quadratic = without.information, without.score, without.kept
-        gains = {
-            term: added_gain(*quadratic, without.blocks.rows(own), least)
-            for term, own in offered.items()
-        }
+        own_rows = {t: without.blocks.rows(own) for t, own in offered.items()}
+        gains = {t: added_gain(*quadratic, own, least) for t, own in own_rows.items()}
         best = max(gains, key=lambda one: gains[one])
         left = without.worse - gain(*quadratic) - gains[best]
-        return best if left < most else None
+        if not left < most:
+            return None
+        # the force of the term replaces that of the part left out from the start
+        rows = np.union1d(without.kept, own_rows[best])
+        step, _ = newton_step(without.information, without.score, rows)
+        _, point = self.subset(found, out)
+        values = moved(found.problem, without.blocks, point.values, rows, step)
+        return best, point._replace(values=values)
 
     def pruned(self, found: Missing, allowed: Callable[[Missing], float]) -> Missing:
         """Return the fit without the functions and terms that are not needed.
@@ -137,11 +144,12 @@ class LeftOut:
         `small(fit)`, the tolerated increase in cost.
         """
         for out in (*found.functions, *sorted(found.names)):
-            rest, point = self.subset(found, out)
+            rest, _ = self.subset(found, out)
             most = self.policy.lead_bic * heat_of(found.fit) + small(found)
-            rival = self.replacement(found, out, most)
-            if rival is None:
+            replaced = self.replacement(found, out, most)
+            if replaced is None:
                 continue
+            rival, point = replaced
             progress(f"fitting {spelled(rival)}", None)
             names, trial = rest.names | {rival}, None
             for problem in problems:
