@@ -56,6 +56,6 @@ class FilippovSystem(SwitchedSystem):
             sides: +1 above the surface or -1 below it, shape `(1,)`.
 
         Returns:
-            Rates per second, shape `(n,)`.
+            Rate of change of the state, shape `(n,)`.
         """
         return jnp.where(sides[0] > 0, self.above(t, state), self.below(t, state))

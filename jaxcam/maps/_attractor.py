@@ -22,7 +22,7 @@ class Attractor(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The kind as text."""
+        """The kind of attractor, in words."""
         if not self.bounded:
             return "none"
         if self.period == 1:

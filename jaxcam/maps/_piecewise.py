@@ -46,7 +46,7 @@ class PiecewiseMap(eqx.Module):
 
 
 class SkewMap(PiecewiseMap):
-    """Skew map x -> a x + mu for x <= 0, b x + mu + jump for x > 0.
+    """Skew tent map x -> a x + mu for x <= 0, b x + mu + jump for x > 0.
 
     It is the normal form of a border collision if `jump` is zero, and that of a
     discontinuous map otherwise (thesis, Figure 2.11 (a) and (b)).
