@@ -64,8 +64,8 @@ def equivalent_control(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, " n"]]:
     """Return Utkin's equivalent control u of x' = f + g u, where u is 1 above the
-    surface and -1 below it, so f is the mean of the two vector fields and g half of
-    `above` - `below`.
+    surface and -1 below it, so f is the mean of the two vector fields, and g is half
+    the difference `above` - `below`.
 
     With the switching function H, the control solves H_t + H_x (f + g u) = 0 and is in
     [-1, 1] if the system slides. Because the control enters linearly, the resulting
