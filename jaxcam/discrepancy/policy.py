@@ -64,9 +64,8 @@ class Policy:
     )
     corner_share: float = decides(
         3e-4,
-        "largest cost, as a fraction of the explained cost, attributed to the "
-        "smoothing of dry friction; a term that explains less is not named together "
-        "with friction",
+        "largest cost, as a fraction of the explained cost, attributed to smoothing "
+        "dry friction; a term that explains less is not named together with friction",
     )
     separate_gain: float = decides(
         0.5,
