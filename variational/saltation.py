@@ -123,12 +123,12 @@ def saltation_into_contact(
     """Return the matrix that maps a perturbation before an impact to a perturbation in
     the contact that follows.
 
-    This is for an impact after which contact begins immediately: a plastic impact, or
-    one in a chatter sequence whose remaining impacts are completed analytically. The
-    normal velocity after the impact is zero, and the field is that of contact (thesis,
-    eq. 2.30). The rank falls by two, because gap and normal velocity are then zero
-    regardless of their previous values; in a system with two states, all perturbations
-    are removed, and the motion has no memory of its past.
+    Use this matrix for an impact after which contact begins immediately: a plastic
+    impact, or an impact in a chatter sequence whose remaining impacts are completed
+    analytically. The normal velocity after the impact is zero, and the field is that of
+    contact (thesis, eq. 2.30). The rank falls by two, because gap and normal velocity
+    are then zero regardless of their previous values; in a system with two states, all
+    perturbations are removed, and the motion has no memory of its past.
 
     Args:
         system: The system.

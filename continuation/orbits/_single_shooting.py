@@ -148,7 +148,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         """Return the equations, given the state at the end of the period.
 
         Args:
-            end: That state, shape `(n,)`.
+            end: State at the end of the period, shape `(n,)`.
             u: Unknowns of the equations, shape `(u,)`.
 
         Returns:

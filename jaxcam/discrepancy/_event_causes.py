@@ -77,7 +77,8 @@ def event_causes(
         Explanations, the best first, including the one without a term.
 
     Raises:
-        ValueError: A term has several strengths, or `observed` is not four speeds.
+        ValueError: A term has several strengths, or `observed` does not contain four
+            speeds.
     """
     if np.shape(observed) != (4,) or np.shape(errors) != (4,):
         raise ValueError(

@@ -45,7 +45,7 @@ class FilippovSystem(SwitchedSystem):
 
     @abc.abstractmethod
     def switching(self, t, state: Float[Array, " n"]) -> Float[Array, ""]:
-        """Return the scalar H that is zero on the surface."""
+        """Return the switching function, a scalar that is zero on the surface."""
 
     def branch(self, t, state: Float[Array, " n"], sides) -> Float[Array, " n"]:
         """Return the rate of change on one side of the surface.

@@ -109,7 +109,7 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
         state: State, shape `(n,)`.
 
     Returns:
-        One of these words.
+        The kind of state, as one of these words.
     """
     above, below = (float(rate) for rate in surface_rates(system, t, state))
     if above == 0 or below == 0:

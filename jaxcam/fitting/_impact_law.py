@@ -51,9 +51,9 @@ class ImpactLaw:
     best: str
     """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
-    """BIC of each law minus that of the constant law; negative is better. A power law
-    in the direction that the impacts do not show counts as a constant law with one
-    extra parameter.
+    """BIC of each law minus that of the constant law; negative is better. For the power
+    law in the other direction, which fits no better than the constant one, the
+    difference is the penalty for one extra parameter.
     """
     p_value: float
     """p-value of the F test of the power law against a constant coefficient."""

@@ -69,8 +69,9 @@ def profile(
         name: Name of the parameter.
         reach: Range of values on either side of the optimum, in standard errors.
         points: Number of values, including the optimum.
-        values: Values at which to fix the parameter instead, in any order; a value is
-            inside the 95 % interval if its cost is below 3.84.
+        values: Values at which to fix the parameter, in any order, instead of those
+            that `reach` and `points` define; a value is inside the 95 % interval if its
+            cost is below 3.84.
         weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the same value as for
             `found`.

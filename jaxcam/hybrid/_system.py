@@ -61,7 +61,7 @@ class HybridSystem(eqx.Module):
             state: State, shape `(n,)`.
 
         Returns:
-            Rates of change (per second), shape `(n,)`.
+            Rate of change of the state, shape `(n,)`.
         """
 
     @abc.abstractmethod

@@ -78,7 +78,7 @@ class SkewMap(PiecewiseMap):
 class SquareRootMap(PiecewiseMap):
     """Square-root map x -> a x + mu for x <= 0, mu - root sqrt(x) for x > 0.
 
-    It is the form of the Poincaré map near a grazing impact (thesis, Figure 2.11 (c)).
+    The Poincaré map near a grazing impact has this form (thesis, Figure 2.11 (c)).
 
     Examples:
         >>> from jaxcam.maps import SquareRootMap

@@ -35,7 +35,7 @@ class Drive:
     window: int
     """Number of samples in each smoothing parabola."""
     acceleration: DriveAcceleration
-    """Angular acceleration, estimated over a longer time than the rate."""
+    """Angular acceleration, estimated over a longer window than the rate."""
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:
