@@ -62,13 +62,13 @@ class GrazingForm(eqx.Module):
     time: Float[Array, ""]
     """Time at which the gap of the orbit is smallest (s)."""
     state: Float[Array, " n"]
-    """State at that time, shape `(n,)`."""
+    """State at `time`, shape `(n,)`."""
     clearance: Float[Array, ""]
-    """Gap at that time: zero for a grazing orbit, positive before grazing."""
+    """Gap at `time`: zero for a grazing orbit, positive before grazing."""
     acceleration: Float[Array, ""]
-    """Acceleration of the gap at that time, positive."""
+    """Acceleration of the gap at `time`, positive."""
     restitution: Float[Array, ""]
-    """Coefficient of restitution at that time."""
+    """Coefficient of restitution at `time`."""
     normal: Float[Array, " n"]
     """Gradient H_x of the gap, shape `(n,)`."""
     normal_parameters: Float[Array, " q"]
@@ -82,7 +82,9 @@ class GrazingForm(eqx.Module):
     n)`.
     """
     matrix_parameters: Float[Array, "n q"]
-    """Derivative N_mu of that period with respect to the parameters, shape `(n, q)`."""
+    """Derivative N_mu of one period starting at `time` with respect to the parameters,
+    shape `(n, q)`.
+    """
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:

@@ -80,7 +80,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     reference: Float[Array, " n"]
     """State in the plane of the phase condition, shape `(n,)`."""
     normal: Float[Array, " n"]
-    """Unit normal of that plane, shape `(n,)`."""
+    """Unit normal of the plane of the phase condition, shape `(n,)`."""
     settings: Settings
     """Accuracy of the simulations."""
     periods: int = eqx.field(static=True)

@@ -43,7 +43,7 @@ class Experiment:
     the rms of its error band.
     """
     then: Mapping[str, float]
-    """Standard errors with the recording, in the same form."""
+    """Standard errors with the recording, in the form of `now`."""
     speed: float | None = None
     """Speed of the cam (rad/s), if there is one."""
 

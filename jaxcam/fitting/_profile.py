@@ -26,7 +26,7 @@ class Profile:
     cost: Float[np.ndarray, " k"]
     """Minus twice the log-likelihood, relative to the optimum, shape `(k,)`."""
     fits: tuple[Fit, ...]
-    """The fits at these values."""
+    """The fits with the parameter fixed at each of `values`."""
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -51,9 +51,9 @@ class RestitutionFit:
     names: tuple[str, ...]
     """Names of the fitted parameters of the law."""
     values: Float[np.ndarray, " p"]
-    """Values of these parameters."""
+    """Fitted values, in the order of `names`."""
     stderr: Float[np.ndarray, " p"]
-    """Standard errors of these values."""
+    """Standard errors of `values`."""
     cost: float
     """Sum of squared residuals in units of the standard errors, with Huber's loss
     function.

@@ -59,7 +59,7 @@ class ComposedMap(eqx.Module):
     section: Float[Array, ""]
     """Time of the section at the end of the period (s)."""
     state: Float[Array, "2"]
-    """State, at this section, of the orbit that starts from contact at release, shape
+    """State at the section of the orbit that starts from contact at release, shape
     `(2,)`.
     """
     relative: Float[Array, "2"]

@@ -76,7 +76,7 @@ class Structure:
     value: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape at these values, in `unit`."""
+    """The shape at the values in `grid`, in `unit`."""
     stderr: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )

@@ -105,7 +105,7 @@ class Completion(NamedTuple):
     time: Float[Array, ""]
     """Accumulation time (s)."""
     state: Float[Array, " n"]
-    """State at that time, shape `(n,)`."""
+    """State at the accumulation time, shape `(n,)`."""
     smallness: Float[Array, ""]
     """The parameter lambda/(1 - r), which must be small for the completion to be
     valid.
