@@ -68,7 +68,9 @@ class Row:
     worst_phase: float
     """Cam angle within one turn at `worst_time` (rad)."""
     worst_score: float
-    """Mean difference over the 10 ms around `worst_time`, in standard errors."""
+    """Magnitude of the mean difference over the 10 ms around `worst_time`, in standard
+    errors.
+    """
 
     def shown(self) -> tuple[str, str, str]:
         """Return the residual and the noise as text, and the unit of both: that of the
