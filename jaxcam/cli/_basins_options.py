@@ -22,11 +22,11 @@ class Cells:
 
     low: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Lower corner of the initial states."),
+        typer.Option(metavar="A,B", help="Lower corner of the grid of initial states."),
     ] = None
     high: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Upper corner of the initial states."),
+        typer.Option(metavar="A,B", help="Upper corner of the grid of initial states."),
     ] = None
     shape: Annotated[
         str,

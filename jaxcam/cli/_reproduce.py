@@ -32,8 +32,8 @@ def reproduce(
         typer.Option(
             metavar="NAME",
             help=(
-                "Resolution of diagrams and basins: default (coarse), or full (as in "
-                "the thesis)."
+                "Resolution of diagrams and basins: default, which is coarse, or full, "
+                "as in the thesis."
             ),
         ),
     ] = _SIZES[0],

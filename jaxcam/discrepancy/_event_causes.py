@@ -1,7 +1,8 @@
-"""Find the physics that would shift the predicted event speeds to the observed ones.
+"""Find the physics that would shift predicted transition speeds to the observed ones.
 
-No recordings are needed, only the bifurcation speeds of a rig. The strength of each
-term and one parameter of the rig are fitted to these speeds.
+No recordings are needed, only the speeds at which the type of motion of a rig changes
+(transition speeds). The strength of each term and one parameter of the rig are fitted
+to these speeds.
 """
 
 import dataclasses
@@ -38,8 +39,8 @@ class EventCause:
     of chatter; NaN if there is none.
     """
     misfit: float
-    """Sum of the squared residuals of the speeds and of the deviation of the parameter,
-    each in units of its standard error.
+    """Sum of the squared residuals of the speeds, in units of their standard errors,
+    and the squared deviation of the parameter, in units of its tolerance.
     """
 
 

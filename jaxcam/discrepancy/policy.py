@@ -179,7 +179,7 @@ class Policy:
     )
     fitted_subsets: int = bounds(6, "number of subsets fitted for each size above one")
     lead_bic: float = bounds(
-        50.0, "difference in BIC from the best up to which a subset or form is tried"
+        50.0, "a subset or form is tried if its BIC exceeds the best by at most this"
     )
     helpful_cost: float = bounds(
         0.7,
@@ -269,19 +269,19 @@ class Policy:
     bootstrap: int = bounds(
         200, "number of bootstrap samples, both of blocks and of drive signals"
     )
-    frequency_grid: int = bounds(
-        4, "number of frequencies per resolution cell of a scan"
-    )
+    frequency_grid: int = bounds(4, "number of scan frequencies per resolution cell")
     cause_strengths: tuple[float, float, int] = bounds(
         (0.1, 1.5, 24),
-        "strengths tried in a fit to event speeds: the first, as a multiple of the "
-        "typical strength; the ratio of consecutive strengths; and their number",
+        "strengths tried in a fit to transition speeds: the first, as a multiple of "
+        "the typical strength; the ratio of consecutive strengths; and their number",
     )
     cause_worse: float = bounds(
         4.0, "multiple of the smallest misfit above which no larger strength is tried"
     )
-    cause_difference: float = bounds(1e-3, "relative step for event-speed derivatives")
-    cause_fits: int = bounds(40, "evaluation limit for a fit to event speeds")
+    cause_difference: float = bounds(
+        1e-3, "relative step for transition-speed derivatives"
+    )
+    cause_fits: int = bounds(40, "evaluation limit for a fit to transition speeds")
     trace_stride: float = bounds(
         0.1, "step in the trace of the monodromy matrix along a branch"
     )

@@ -26,9 +26,9 @@ def superstable(
     starting from an extrapolation of the previous ones.
 
     Args:
-        system: The map, a module.
+        system: The map, an `equinox.Module`.
         where: Selects the parameter.
-        critical: The critical point.
+        critical: The critical point, at which the derivative of the map is zero.
         first: Initial guesses for the first two parameter values.
         count: Number of parameter values.
 

@@ -154,11 +154,11 @@ def normal_acceleration(system, t, x) -> Float[Array, " m"]:
 
 
 def normal_directions(system, t, x) -> Float[Array, "m n"]:
-    """Return the unit direction D of the impulse for each constraint.
+    """Return the direction D of the impulse for each constraint.
 
-    The result is exact if the normal velocity v is zero: an impact changes the state by
-    W v, which vanishes with v, so W follows from the derivative of this change along
-    the gradient of v.
+    D is scaled so that v_x D = 1, where v is the normal velocity and v_x its gradient.
+    An impact changes the state by W v, and W is parallel to D. The direction is found
+    from the derivative of this change along v_x; this is exact where v is zero.
 
     Args:
         system: The system.
