@@ -74,9 +74,13 @@ class GrazingForm(eqx.Module):
     normal_parameters: Float[Array, " q"]
     """Derivative H_mu of the gap with respect to the parameters, shape `(q,)`."""
     zero_time: Float[Array, " n"]
-    """The vector b of the zero-time discontinuity mapping, shape `(n,)`."""
+    """The vector b of the zero-time discontinuity mapping, z -> z + b sqrt(depth),
+    shape `(n,)`.
+    """
     section: Float[Array, " n"]
-    """The vector b of the discontinuity mapping of the section v = 0, shape `(n,)`."""
+    """The corresponding vector of the discontinuity mapping of the section on which the
+    normal velocity is zero, shape `(n,)`.
+    """
     matrix: Float[Array, "n n"]
     """Derivative N of one period starting at `time`, without the impact, shape `(n,
     n)`.

@@ -24,7 +24,8 @@ def saltation_matrix(
 ) -> Float[Array, "n n"]:
     """Return the saltation matrix, which maps a perturbation across an impact.
 
-    With F- and F+ the vector field before and after, R the impact law and H the gap,
+    With F- and F+ the vector field before and after the impact, R the impact law, H the
+    gap, and subscripts for partial derivatives,
 
         S = R_x + (F+ - R_t - R_x F-) H_x / (H_t + H_x F-),
 
@@ -228,9 +229,10 @@ def saltation_second(
 ) -> Float[Array, "n n n"]:
     """Return the second derivative of the flow across an impact, for normal forms.
 
-    A perturbation d becomes S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is returned.
-    It is computed by nested forward differentiation of [`variational.event_map`][], and
-    grows like the inverse cube of the impact speed.
+    A perturbation d becomes S d + (1/2) d B d + O(|d|^3), where S is the saltation
+    matrix, and `B[i, j, k]` is returned. It is computed by nested forward
+    differentiation of [`variational.event_map`][], and grows like the inverse cube of
+    the impact speed.
 
     Args:
         system: The system.

@@ -15,7 +15,8 @@ from .engine import Weights
 class Profile:
     """The profile likelihood of one parameter.
 
-    The cost is below 3.84 inside the 95 % interval; `interval` is interpolated, and
+    The cost is below 3.84, the 95 % quantile of the chi-square distribution with one
+    degree of freedom, inside the 95 % interval; `interval` is interpolated, and
     infinite on a side where the cost does not reach this value.
     """
 

@@ -136,10 +136,10 @@ def fit_restitution(
 ) -> RestitutionFit:
     """Fit parameters of a restitution law to the speeds before and after every impact.
 
-    The misfit of an impact is its separation speed minus r times its approach speed,
-    divided by the standard error of this difference, to which both speeds and the
-    surface speed contribute. The method is Levenberg-Marquardt (optimistix) with
-    Huber's loss function, which is linear for outliers.
+    The misfit of an impact is its separation speed minus the coefficient of restitution
+    times its approach speed, divided by the standard error of this difference, to which
+    both speeds and the surface speed contribute. The method is Levenberg-Marquardt
+    (optimistix) with Huber's loss function, which is linear for outliers.
 
     Args:
         segments: Segments from `segment_case` or `segment`.

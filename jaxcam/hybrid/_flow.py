@@ -44,8 +44,10 @@ class Arrival(eqx.Module):
     events: EventCounts
     """Numbers of events between start and end."""
     start: Bool[Array, " flags"]
-    """Mode at the start, shape `(m + 2 k,)`: constraints in contact, then surfaces on
-    whose negative side the motion starts, then surfaces along which it slides."""
+    """Mode at the start, shape `(m + 2 k,)` for m constraints and k switching surfaces:
+    constraints in contact, then surfaces on whose negative side the motion starts, then
+    surfaces along which it slides.
+    """
 
 
 def flow(

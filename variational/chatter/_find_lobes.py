@@ -63,8 +63,8 @@ def find_lobes(
 ) -> Lobes:
     """Sample the stroboscopic map around the interruption and find its lobes.
 
-    A lobe ends where the number of impacts changes; the ends are located to within
-    rounding error (thesis, eq. 5.1).
+    A lobe is a part of the map on which the number of impacts per period is constant;
+    its ends are located to within rounding error (thesis, eq. 5.1).
 
     Args:
         system: A system as for [`variational.chatter_frame`][], near the interruption.

@@ -109,7 +109,9 @@ def motion_rates(field: Callable, t, x) -> tuple[State, State, State]:
 
 
 def normal_velocity(system, t, x) -> Float[Array, " m"]:
-    """Return v = H_t + H_x F for each constraint (thesis, eq. 2.26).
+    """Return the normal velocity v = H_t + H_x F of each constraint, where H is the
+    gap, F the vector field, and subscripts denote partial derivatives (thesis, eq.
+    2.26).
 
     Args:
         system: The system.
@@ -131,7 +133,8 @@ def normal_velocity(system, t, x) -> Float[Array, " m"]:
 
 
 def normal_acceleration(system, t, x) -> Float[Array, " m"]:
-    """Return a = dv/dt in free flight for each constraint (thesis, eq. 2.29).
+    """Return the normal acceleration a = dv/dt of each constraint in free flight, where
+    v is the normal velocity (thesis, eq. 2.29).
 
     Args:
         system: The system.
