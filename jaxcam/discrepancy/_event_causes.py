@@ -64,8 +64,8 @@ def event_causes(
     Args:
         rig: The rig.
         observed: Observed speeds of detachment (valve float), of the fold and the flip
-            of P(1,1), and of the interruption of chatter (rad/s); NaN for a speed that
-            was not observed.
+            of P(1,1) (the orbit with one impact per revolution of the cam), and of the
+            interruption of chatter (rad/s); NaN for a speed that was not observed.
         errors: Standard error of each speed (rad/s).
         terms: Candidate terms, each with one strength.
         where: Selects the parameter of the rig that is fitted together with each term,
