@@ -131,8 +131,9 @@ def follow_batch(
         states: Initial states, shape `(branches, n)`, one row per branch.
         where: As for [`continuation.follow`][].
         bounds: As for [`continuation.follow`][].
-        algorithm: Algorithm that corrects in a plane and predicts from a single point,
-            for example along the tangent; default: [`continuation.PseudoArclength`][].
+        algorithm: Algorithm that corrects in a fixed hyperplane and predicts from a
+            single point, for example along the tangent; default:
+            [`continuation.PseudoArclength`][].
         parameters: Parameters of the problem; each float leaf has shape `(branches,)`
             or is a scalar for all branches. Default: those of the problem.
         settings: As for [`continuation.follow`][].

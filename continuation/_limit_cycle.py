@@ -19,9 +19,9 @@ class LimitCycle(AbstractProblem):
     """Periodic orbits of u' = vector_field(u, parameters) with unknown period.
 
     The unknowns are (u(0), period). The equations are u(period) = u(0) and a phase
-    condition: u(0) lies in a plane, which is updated at each point of a branch. The
-    multipliers are those of the map on that plane (thesis, eq. 2.14), without the
-    trivial one.
+    condition: u(0) lies in a hyperplane, which is updated at each point of a branch.
+    The multipliers are those of the return map to that hyperplane (thesis, eq. 2.14),
+    without the trivial one.
 
     Examples:
         >>> import continuation
@@ -41,9 +41,9 @@ class LimitCycle(AbstractProblem):
     reference: Any
     """Initial reference: a state on or near the cycle, `(n,)`."""
     normal: Any
-    """Unit normal of the plane, `(n,)`."""
+    """Unit normal of the hyperplane, `(n,)`."""
     basis: Any
-    """Unit vectors in the plane, `(n, n-1)`."""
+    """Unit vectors in the hyperplane, `(n, n-1)`."""
     steps: int = eqx.field(static=True)
     """Number of equal eighth-order Dormand-Prince steps per period.
     `point.observed["error"]` is the largest estimated error of a step, relative to the

@@ -11,8 +11,8 @@ class BranchSettings(eqx.Module):
 
     The square of the length of a step is the mean square change of the state, in units
     of `problem.scale`, plus the square of the change of the parameter, in units of the
-    width of its bounds. For example, a step of 0.01 in the parameter alone is a
-    hundredth of the width of the bounds.
+    distance between its bounds. For example, a step of 0.01 in the parameter alone is a
+    hundredth of this distance.
 
     Examples:
         >>> import continuation

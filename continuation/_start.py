@@ -25,8 +25,8 @@ class Start(eqx.Module):
     """Value of the parameter; default: that of `problem.parameters`."""
     tangent: np.ndarray | None = None
     """Direction (state, parameter) in which the branch leaves, `(n+1,)`; its length
-    does not matter. The first point is searched for in the plane perpendicular to it,
-    so that at a branch point the new branch is found rather than the known one.
+    does not matter. The first point is searched for in the hyperplane perpendicular to
+    it, so that at a branch point the new branch is found rather than the known one.
     Default: along the branch through `state`, in the requested direction.
     """
     step: float | None = None

@@ -21,8 +21,8 @@ def table(
 
     Args:
         branch: The branch.
-        every: Show every ordinary point whose label is a multiple of this; 0 shows
-            none.
+        every: Show every ordinary point whose label is a multiple of this number; 0
+            shows none.
         components: Number of state components to show.
         shown: Heading of the parameter column, and a factor for its values, such as
             `("speed (rpm)", 30 / math.pi)`.

@@ -18,11 +18,12 @@ class AbstractAlgorithm(eqx.Module):
     control: eqx.AbstractVar[AbstractStepControl]
     """Step control."""
     least_norm: eqx.AbstractClassVar[bool]
-    """Whether corrections have the least norm instead of lying in a fixed plane."""
+    """Whether corrections have the least norm instead of lying in a fixed hyperplane.
+    """
 
     @abc.abstractmethod
     def normal(self, tangent: Float[Any, " n+1"]) -> Float[Any, " n+1"]:
-        """Return the normal of the corrector's plane, given the tangent.
+        """Return the normal of the corrector's hyperplane, given the tangent.
 
         The components of both are divided by the scales of the problem.
 
@@ -96,8 +97,9 @@ class PseudoArclength(AbstractAlgorithm):
 class MoorePenrose(AbstractAlgorithm):
     """Predictor-corrector with least-norm corrections from the Moore-Penrose inverse.
 
-    The corrector's plane turns with the iterate. To first order, this is equivalent to
-    recomputing the tangent in each iteration (thesis, section 3.4.3, method 3).
+    The corrector's hyperplane turns with the iterate. To first order, this is
+    equivalent to recomputing the tangent in each iteration (thesis, section 3.4.3,
+    method 3).
 
     Examples:
         >>> import continuation

@@ -63,12 +63,13 @@ def covariant_vectors(
 ) -> CovariantVectors:
     """Compute the covariant Lyapunov vectors along a motion, including impacts.
 
-    Forwards in time, an orthonormal frame is propagated by the derivative M of the flow
-    over each period, M Q = Q' R. Backwards, vectors in this frame are propagated by the
-    inverses of the matrices R, under which they converge to the covariant directions
-    (Ginelli et al., Physical Review Letters 99, 130601, 2007). For a periodic orbit,
-    these are the eigenvectors of the monodromy matrix. The function is pure: it can be
-    compiled, and batched with `vmap` over states and parameters.
+    Forwards in time, an orthonormal frame Q is propagated by the derivative M of the
+    flow over each period to the next frame Q': M Q = Q' R, with R upper triangular.
+    Backwards, vectors in this frame are propagated by the inverses of the matrices R,
+    under which they converge to the covariant directions (Ginelli et al., Physical
+    Review Letters 99, 130601, 2007). For a periodic orbit, these are the eigenvectors
+    of the monodromy matrix. The function is pure: it can be compiled, and batched with
+    `vmap` over states and parameters.
 
     Args:
         system: The system.

@@ -62,27 +62,33 @@ class GrazingForm(eqx.Module):
     time: Float[Array, ""]
     """Time at which the gap of the orbit is smallest (s)."""
     state: Float[Array, " n"]
-    """State at that time, shape `(n,)`."""
+    """State at `time`, shape `(n,)`."""
     clearance: Float[Array, ""]
-    """Gap at that time: zero for a grazing orbit, positive before grazing."""
+    """Gap at `time`: zero for a grazing orbit, positive before grazing."""
     acceleration: Float[Array, ""]
-    """Acceleration of the gap at that time, positive."""
+    """Acceleration of the gap at `time`, positive."""
     restitution: Float[Array, ""]
-    """Coefficient of restitution at that time."""
+    """Coefficient of restitution at `time`."""
     normal: Float[Array, " n"]
     """Gradient H_x of the gap, shape `(n,)`."""
     normal_parameters: Float[Array, " q"]
     """Derivative H_mu of the gap with respect to the parameters, shape `(q,)`."""
     zero_time: Float[Array, " n"]
-    """The vector b of the zero-time discontinuity mapping, shape `(n,)`."""
+    """The vector b of the zero-time discontinuity mapping, z -> z + b sqrt(depth),
+    shape `(n,)`.
+    """
     section: Float[Array, " n"]
-    """The vector b of the discontinuity mapping of the section v = 0, shape `(n,)`."""
+    """The corresponding vector of the discontinuity mapping of the section on which the
+    normal velocity is zero, shape `(n,)`.
+    """
     matrix: Float[Array, "n n"]
     """Derivative N of one period starting at `time`, without the impact, shape `(n,
     n)`.
     """
     matrix_parameters: Float[Array, "n q"]
-    """Derivative N_mu of that period with respect to the parameters, shape `(n, q)`."""
+    """Derivative N_mu of one period starting at `time` with respect to the parameters,
+    shape `(n, q)`.
+    """
 
     @property
     def multipliers(self) -> Complex[Array, " n"]:

@@ -10,7 +10,8 @@ def nordmark_map(x: ArrayLike, mu: ArrayLike, lam: ArrayLike) -> Float[Array, ".
     This is the limit of [`variational.GrazingForm`][] if one multiplier `lam` in (0, 1)
     dominates the others: x is the smallest gap minus that of the orbit that would pass
     through the constraint, and mu is the depth of that orbit, both divided by the
-    square of the coefficient (Nordmark, Journal of Sound and Vibration 145, 1991).
+    square of `GrazingForm.coefficient` (Nordmark, Journal of Sound and Vibration 145,
+    1991).
 
     Args:
         x: Scaled gap, any shape.
@@ -32,8 +33,8 @@ def nordmark_map(x: ArrayLike, mu: ArrayLike, lam: ArrayLike) -> Float[Array, ".
 
 
 def nordmark_window(lam: float, period: int) -> tuple[float, float]:
-    """Return the interval of mu in which the orbit with one impact per `period`
-    iterations is stable.
+    """Return the interval of the parameter mu of [`variational.nordmark_map`][] in
+    which the orbit with one impact per `period` iterations is stable.
 
         3 lam^(2m-2) / (4 (1 - lam^m)) < mu < lam^(2m-4) (1 - lam) / (1 - lam^(m-1))^2
 

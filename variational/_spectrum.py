@@ -16,10 +16,10 @@ class LyapunovSpectrum(Printed):
     stderr: Float[Array, "*lanes n"]
     """Standard error of each exponent: the larger of two estimates. The first is the
     scatter of blocks of consecutive periods. The second is the oscillation of the
-    accumulated growth about a straight line, divided by the duration; it contains the
-    orientation of the frame at the end, which near a periodic orbit with a complex pair
-    of multipliers rotates with the pair: the error then decreases only as one over the
-    duration.
+    accumulated growth about a straight line, divided by the duration; it depends on the
+    final orientation of the frame. Near a periodic orbit with a complex pair of
+    multipliers, the frame rotates with the pair, and the error decreases only in
+    inverse proportion to the duration.
     """
     impact_rate: Float[Array, "*lanes"]
     """Mean number of impacts per second."""

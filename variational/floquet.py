@@ -15,7 +15,7 @@ from .orbits import by_product, eigenvalues, Method, Orbit, turn_derivative
 
 
 class Stability(eqx.Module):
-    """Stability of an orbit, from its monodromy matrix."""
+    """Stability of an orbit, from its monodromy matrix M and the multipliers mu_i."""
 
     multipliers: Complex[Array, " n"]
     """Floquet multipliers, largest modulus first, shape `(n,)`."""
@@ -127,7 +127,8 @@ def stability(system: HybridSystem, orbit: Orbit) -> Stability:
 def test_functions(
     multipliers: Complex[Array, " n"],
 ) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
-    """Return det(M - I), det(M + I) and the product of mu_i mu_j - 1.
+    """Return det(M - I), det(M + I) and the product of mu_i mu_j - 1 over i < j, for a
+    monodromy matrix M with multipliers mu_i.
 
     Args:
         multipliers: Eigenvalues of M, shape `(n,)`.

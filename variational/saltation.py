@@ -24,7 +24,8 @@ def saltation_matrix(
 ) -> Float[Array, "n n"]:
     """Return the saltation matrix, which maps a perturbation across an impact.
 
-    With F- and F+ the vector field before and after, R the impact law and H the gap,
+    With F- and F+ the vector field before and after the impact, R the impact law, H the
+    gap, and subscripts for partial derivatives,
 
         S = R_x + (F+ - R_t - R_x F-) H_x / (H_t + H_x F-),
 
@@ -123,12 +124,12 @@ def saltation_into_contact(
     """Return the matrix that maps a perturbation before an impact to a perturbation in
     the contact that follows.
 
-    This is for an impact after which contact begins immediately: a plastic impact, or
-    one in a chatter sequence whose remaining impacts are completed analytically. The
-    normal velocity after the impact is zero, and the field is that of contact (thesis,
-    eq. 2.30). The rank falls by two, because gap and normal velocity are then zero
-    regardless of their previous values; in a system with two states, all perturbations
-    are removed, and the motion has no memory of its past.
+    Use this matrix for an impact after which contact begins immediately: a plastic
+    impact, or an impact in a chatter sequence whose remaining impacts are completed
+    analytically. The normal velocity after the impact is zero, and the field is that of
+    contact (thesis, eq. 2.30). The rank falls by two, because gap and normal velocity
+    are then zero regardless of their previous values; in a system with two states, all
+    perturbations are removed, and the motion has no memory of its past.
 
     Args:
         system: The system.
@@ -228,9 +229,10 @@ def saltation_second(
 ) -> Float[Array, "n n n"]:
     """Return the second derivative of the flow across an impact, for normal forms.
 
-    A perturbation d becomes S d + (1/2) d B d + O(|d|^3), and `B[i, j, k]` is returned.
-    It is computed by nested forward differentiation of [`variational.event_map`][], and
-    grows like the inverse cube of the impact speed.
+    A perturbation d becomes S d + (1/2) d B d + O(|d|^3), where S is the saltation
+    matrix, and `B[i, j, k]` is returned. It is computed by nested forward
+    differentiation of [`variational.event_map`][], and grows like the inverse cube of
+    the impact speed.
 
     Args:
         system: The system.

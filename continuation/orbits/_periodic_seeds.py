@@ -33,8 +33,8 @@ def orbits_near(
         periods: As for [`continuation.periodic_orbit`][].
         t0: As for [`continuation.periodic_orbit`][].
         settings: As for [`continuation.periodic_orbit`][].
-        same: Two orbits count as equal if their states at `t0` differ by less than
-            this, relative to [`jaxcam.hybrid.sizes.component_sizes`][].
+        same: Two orbits count as equal if their states at `t0` differ by less than this
+            value, relative to [`jaxcam.hybrid.sizes.component_sizes`][].
 
     Returns:
         The orbits in the order in which they were found. Guesses from which Newton's

@@ -34,10 +34,11 @@ class ImpactingOrbits(AbstractOrbits):
     """Periodic orbits of a hybrid system with a known sequence of impacts.
 
     The unknowns and equations are those of [`variational.orbits.Shooting`][]. For each
-    impact, the unknowns are its phase (time in forcing periods) and the state after it,
-    with total shape `(m (1 + n),)`. Without impacts, they are the state at time zero,
-    shape `(n,)`. For a system without forcing, the first phase is zero, the period (s)
-    takes its place, and phases are in periods of the orbit.
+    impact, the unknowns are its phase (time in forcing periods) and the state after it;
+    for m impacts of a system with n states, their shape is `(m (1 + n),)`. Without
+    impacts, they are the state at time zero, shape `(n,)`. For a system without
+    forcing, the first phase is zero, the period (s) takes its place, and phases are in
+    periods of the orbit.
 
     Examples:
         >>> import continuation

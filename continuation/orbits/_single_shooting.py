@@ -43,13 +43,13 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     The unknowns are the state at a fixed phase of the forcing, shape `(n,)`, or,
     without forcing, the state and the period (s), shape `(n + 1,)`. The equations
     require that a simulation return to the state and, without forcing, that the state
-    lie in a plane perpendicular to the motion; the plane is updated at each point of a
-    branch. One compiled program computes orbits with any number of impacts, crossings
-    and sliding phases. The Jacobian contains the saltation matrices of all events.
-    Points at which the sequence of events changes are located and named: `"grazing"`,
-    `"grazing-sliding"`, `"crossing-sliding"`, `"switching-sliding"`, `"adding-sliding"`
-    or `"change of events"`. If the sequence changes twice in one step, the second
-    change may be missed.
+    lie in a hyperplane perpendicular to the motion; the hyperplane is updated at each
+    point of a branch. One compiled program computes orbits with any number of impacts,
+    crossings and sliding phases. The Jacobian contains the saltation matrices of all
+    events. Points at which the sequence of events changes are located and named:
+    `"grazing"`, `"grazing-sliding"`, `"crossing-sliding"`, `"switching-sliding"`,
+    `"adding-sliding"` or `"change of events"`. If the sequence changes twice in one
+    step, the second change may be missed.
 
     Where an impact grazes, the Jacobian is unbounded on one side. In a system with
     switching surfaces, the grazing is therefore located with equations that are smooth
@@ -78,9 +78,9 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     phase: Float[Array, ""]
     """Phase of the forcing at the state (periods); zero without forcing."""
     reference: Float[Array, " n"]
-    """State in the plane of the phase condition, shape `(n,)`."""
+    """State in the hyperplane of the phase condition, shape `(n,)`."""
     normal: Float[Array, " n"]
-    """Unit normal of that plane, shape `(n,)`."""
+    """Unit normal of the hyperplane of the phase condition, shape `(n,)`."""
     settings: Settings
     """Accuracy of the simulations."""
     periods: int = eqx.field(static=True)
@@ -88,7 +88,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     turns: int = eqx.field(static=True, default=1)
     """Number of times that an orbit without forcing is traversed: 2 after a flip."""
     shift: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
-    """Time by which the start of the period is later (forcing periods), so that no
+    """Time by which the start of the period is delayed (forcing periods), so that no
     impact occurs there.
     """
     passed: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
@@ -148,7 +148,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         """Return the equations, given the state at the end of the period.
 
         Args:
-            end: That state, shape `(n,)`.
+            end: State at the end of the period, shape `(n,)`.
             u: Unknowns of the equations, shape `(u,)`.
 
         Returns:
@@ -165,7 +165,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
 
     def linearisation(self, u, parameters, jacobian) -> Float[Array, "k k"]:
         """Return the monodromy matrix or, without forcing, the derivative of the return
-        map on the plane.
+        map on the hyperplane.
 
         Args:
             u: Unknowns of the equations, shape `(u,)`.

@@ -21,10 +21,12 @@ class Cells:
     """The grid of initial states, and the duration of each run."""
 
     low: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Lower corner of the grid.")
+        str | None,
+        typer.Option(metavar="A,B", help="Lower corner of the grid of initial states."),
     ] = None
     high: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Upper corner of the grid.")
+        str | None,
+        typer.Option(metavar="A,B", help="Upper corner of the grid of initial states."),
     ] = None
     shape: Annotated[
         str,
@@ -35,15 +37,19 @@ class Cells:
         typer.Option(metavar="N", help="Number of forcing periods per simulation."),
     ] = 100
     keep: Annotated[
-        int, typer.Option(metavar="N", help="Number of final periods to compare.")
+        int,
+        typer.Option(
+            metavar="N",
+            help="Number of final periods from which attractors are identified.",
+        ),
     ] = 24
     reruns: Annotated[
         int,
         typer.Option(
             metavar="N",
             help=(
-                "Number of times to double the length of a simulation whose motion is "
-                "not yet periodic."
+                "Maximum number of times that the length of a simulation is doubled "
+                "while its motion is not periodic."
             ),
         ),
     ] = 1

@@ -17,7 +17,7 @@ def diagnose(
     rig: RigFile = None,
     system: OwnSystem = None,
     files: Files = Files(),
-    seed: Annotated[int, typer.Option(help="Block-bootstrap seed.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the block bootstrap.")] = 0,
     predict: Annotated[
         bool,
         typer.Option(

@@ -103,7 +103,7 @@ class Starts:
         typer.Option(
             metavar="A,B",
             help="Initial state; default: the `start` state of the rig "
-            "file; without one, a state in sustained contact, or rest.",
+            "file or, if it gives none, a state in sustained contact, or rest.",
         ),
     ] = None
     starts: Annotated[

@@ -115,7 +115,8 @@ OwnSystem: TypeAlias = Annotated[
     typer.Option(
         "--system",
         metavar="FILE.py:CLASS",
-        help="A system in your own Python file; default: that of the rig file.",
+        help="A system in your own Python file; default: the system named in the rig "
+        "file.",
     ),
 ]
 Gaps: TypeAlias = Annotated[

@@ -32,8 +32,8 @@ def reproduce(
         typer.Option(
             metavar="NAME",
             help=(
-                "Resolution of diagrams and basins: default, or full for that of the "
-                "thesis."
+                "Resolution of diagrams and basins: default, which is coarse, or full, "
+                "as in the thesis."
             ),
         ),
     ] = _SIZES[0],
@@ -45,13 +45,14 @@ def reproduce(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write numbers and figures to DIR; for all targets, also a web page.",
+            help="Write numbers and figures to DIR; if TARGET is all, also write a web "
+            "page.",
         ),
     ] = None,
     resume: Resume = False,
 ) -> None:
     """
-    Reproduce tables and figures of a PhD thesis (Alzate, 2008).
+    Reproduce tables and figures from a PhD thesis (Alzate, 2008).
 
     The tables compare the values printed in the thesis with computed values.
 

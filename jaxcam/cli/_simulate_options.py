@@ -18,9 +18,10 @@ class RunOptions:
         typer.Option(
             metavar="A,B",
             help="Initial state, such as 0.3,0, or the word 'release' for the release "
-            "point of a sticking orbit; default: the `start` state of the rig file; "
-            "without one, release, or rest if there is no release point; 1,0 for the "
-            "bouncing ball; 0,0.1,-2 for the triple integrator.",
+            "point of a sticking orbit. By default, 1,0 for the bouncing ball and "
+            "0,0.1,-2 for the triple integrator; for other systems, the `start` state "
+            "in the rig file or, if it gives none, the release point, or rest if "
+            "there is no release point.",
         ),
     ] = None
     t0: Annotated[float, typer.Option(metavar="S", help="Initial time (s).")] = 0.0

@@ -1,7 +1,8 @@
-"""Find the physics that would shift the predicted event speeds to the observed ones.
+"""Find the physics that would shift predicted transition speeds to the observed ones.
 
-No recordings are needed, only the bifurcation speeds of a rig. The strength of each
-term and one parameter of the rig are fitted to these speeds.
+No recordings are needed, only the speeds at which the type of motion of a rig changes
+(transition speeds). The strength of each term and one parameter of the rig are fitted
+to these speeds.
 """
 
 import dataclasses
@@ -38,8 +39,8 @@ class EventCause:
     of chatter; NaN if there is none.
     """
     misfit: float
-    """Sum of the squared residuals of the speeds and of the deviation of the parameter,
-    each in units of its standard error.
+    """Sum of the squared residuals of the speeds, in units of their standard errors,
+    and the squared deviation of the parameter, in units of its tolerance.
     """
 
 
@@ -63,8 +64,8 @@ def event_causes(
     Args:
         rig: The rig.
         observed: Observed speeds of detachment (valve float), of the fold and the flip
-            of P(1,1), and of the interruption of chatter (rad/s); NaN for a speed that
-            was not observed.
+            of P(1,1) (the orbit with one impact per revolution of the cam), and of the
+            interruption of chatter (rad/s); NaN for a speed that was not observed.
         errors: Standard error of each speed (rad/s).
         terms: Candidate terms, each with one strength.
         where: Selects the parameter of the rig that is fitted together with each term,
@@ -77,7 +78,8 @@ def event_causes(
         Explanations, the best first, including the one without a term.
 
     Raises:
-        ValueError: A term has several strengths, or `observed` is not four speeds.
+        ValueError: A term has several strengths, or `observed` does not contain four
+            speeds.
     """
     if np.shape(observed) != (4,) or np.shape(errors) != (4,):
         raise ValueError(

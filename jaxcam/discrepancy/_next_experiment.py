@@ -43,7 +43,7 @@ class Experiment:
     the rms of its error band.
     """
     then: Mapping[str, float]
-    """Standard errors with the recording, in the same form."""
+    """Standard errors with the recording, in the form of `now`."""
     speed: float | None = None
     """Speed of the cam (rad/s), if there is one."""
 
@@ -70,11 +70,12 @@ def compare_experiments(
         found: The diagnosis of the recordings made so far.
         records: Recordings simulated with the diagnosed system (`found.system()`) by
             [`jaxcam.recordings.record`][], and segmented.
-        asked: Names of the parameters to be determined. The default is the strengths of
-            the named terms and the values of the functions found for effects outside
-            the library. Alternative terms whose BIC is not much higher stay free, so
-            that the best recording also distinguishes them from the named ones. If the
-            verdict is `none`, the default is all terms, one at a time.
+        asked: Names of the parameters to be determined. By default, these are the
+            strengths of the named terms and the values of the functions found for
+            effects outside the library. Alternative terms whose BIC is not much higher
+            stay free, so that the best recording also distinguishes them from the named
+            ones. By default, if the verdict is `none`, the strengths of all terms are
+            determined, one at a time.
         progress: Called with a sentence and a fraction, or `None`.
 
     Returns:

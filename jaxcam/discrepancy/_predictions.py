@@ -56,10 +56,11 @@ def predictions(
 
     The speeds are predicted with the refitted textbook model, without and with the
     missing effects: those of detachment (valve float), of the fold and the flip of
-    P(1,1), and of the interruption of complete chatter. Their standard errors are
-    estimated from random rigs, drawn from the distribution of the fitted parameters.
-    Missing effects with a frequency of their own are left out, because they make the
-    motion aperiodic: it does not repeat with the cam.
+    P(1,1) (the orbit with one impact per revolution of the cam), and of the
+    interruption of complete chatter. Their standard errors are estimated from random
+    rigs, drawn from the distribution of the fitted parameters. Missing effects with a
+    frequency of their own are left out, because they make the motion aperiodic: it does
+    not repeat with the cam.
 
     Args:
         found: The diagnosis.

@@ -46,9 +46,12 @@ class Policy:
     form_error: float = decides(
         0.15,
         "maximum relative error of the functional form of a named term; its square is "
-        "the fraction of the explained cost that may remain",
+        "the largest remaining cost that is tolerated, as a fraction of the explained "
+        "cost",
     )
-    form_loss: float = decides(10.0, "largest loss in BIC of a formula that is kept")
+    form_loss: float = decides(
+        10.0, "largest increase in BIC from a function to a formula that replaces it"
+    )
     tie: float = decides(
         10.0,
         "difference in BIC up to which two explanations count as equally good (a "
@@ -57,12 +60,12 @@ class Policy:
     elsewhere: float = decides(
         0.5,
         "another location is chosen if it reduces the squared residual above the noise "
-        "to less than this fraction",
+        "to less than this fraction of the smallest previous value",
     )
     corner_share: float = decides(
         3e-4,
-        "maximum fraction of the explained cost that the smoothing of dry friction may "
-        "cause; a term that explains less is not named together with a friction term",
+        "largest cost, as a fraction of the explained cost, attributed to smoothing "
+        "dry friction; a term that explains less is not named together with friction",
     )
     separate_gain: float = decides(
         0.5,
@@ -71,17 +74,17 @@ class Policy:
     )
     common_gain: float = decides(
         0.9,
-        "minimum gain of a function common to all recordings, relative to that of "
-        "separate parameter values",
+        "smallest gain, relative to that of separate parameter values, at which a "
+        "function common to all recordings is sought",
     )
     near_cost: float = decides(4.0, "cost per sample above which a fit counts as poor")
     knockoffs: int = decides(
-        19, "number of knockoffs of a force; it must explain more than each of them"
+        19, "number of knockoffs; a force must explain more than each of its knockoffs"
     )
     explains: float = decides(
         0.5,
-        "if the fit is poor: maximum cost of a model as a fraction of the cost of the "
-        "model that it extends",
+        "if the fit is poor: largest cost of a model, as a fraction of the cost of the "
+        "model that it extends, at which the extension is accepted",
     )
     distinct_information: float = decides(
         1e-8,
@@ -91,28 +94,28 @@ class Policy:
     half_information: float = decides(
         1e-3,
         "minimum fraction of the information on a term that one half of the recordings "
-        "must contain to estimate the term",
+        "must contain for the term to be estimated from it",
     )
     stretches: int = decides(4, "maximum number of bootstrap blocks per recording")
     stretch_pieces: int = decides(
-        8, "minimum number of flight pieces per bootstrap or held-out block"
+        8, "minimum number of flight pieces per bootstrap block or held-out block"
     )
     folds: int = decides(3, "number of parts of the data in the cross-validation")
     fewest_periods: float = decides(
         4.0, "minimum number of periods of a vibration in the longest recording"
     )
-    period_samples: float = decides(20.0, "minimum samples per period of a vibration")
+    period_samples: float = decides(20.0, "fewest samples allowed per vibration period")
     period_steps: float = decides(
-        2.5, "minimum integration steps per period of a vibration"
+        2.5, "minimum number of integration steps per period of a vibration"
     )
     residual_lags: int = decides(
         20, "number of lags (samples) in the autocorrelation test of the residuals"
     )
     residual_stretches: int = decides(
-        4, "number of sections per recording in that test; the worst section is ignored"
+        4, "sections per recording in the autocorrelation test, the worst being ignored"
     )
     velocity_tail: float = decides(
-        0.005, "fraction of velocities beyond each end of a velocity function's range"
+        0.005, "fraction of velocities excluded at each end of the range of a function"
     )
     drive_wander: float = decides(
         0.75,
@@ -123,7 +126,7 @@ class Policy:
     )
     drive_orders: tuple[float, ...] = decides(
         (1.25, 1.4, 1.6, 1.75, 2.25, 2.4, 2.6, 2.75),
-        "non-harmonic multiples of the rotation frequency at which leakage is measured",
+        "multiples of the rotation frequency at which spectral leakage is measured",
     )
     odd_ratio: float = decides(
         10.0,
@@ -131,7 +134,7 @@ class Policy:
         "that of any other recording",
     )
     records_apart: int = decides(
-        4, "minimum number of recordings for one to be excluded"
+        4, "minimum number of recordings from which one may be excluded"
     )
     noisier: float = decides(
         1.2, "ratio of measured to stated noise above which the measured noise is used"
@@ -139,7 +142,7 @@ class Policy:
     as_noise: float = decides(
         1.2,
         "ratio of rms residual to noise up to which a residual counts as noise; above "
-        "it, a caveat is added",
+        "this ratio, a caveat is added",
     )
     cost_errors: float = decides(
         3.0, "largest excess cost, in standard deviations, that is attributed to noise"
@@ -151,46 +154,42 @@ class Policy:
     )
     resolved: float = decides(
         0.03,
-        "in that case, the minimum noise, as a fraction of the rms residual of the "
-        "textbook model on single pieces of flight",
+        "if model errors are allowed for: the minimum noise, as a fraction of the rms "
+        "residual of the textbook model on single pieces of flight",
     )
 
     # settings that limit the search
     minutes: float = bounds(
         20.0,
-        "time limit in minutes for trying further candidates, measured as on an "
-        "otherwise idle machine",
+        "time limit in minutes for trying further candidates, measured as if the "
+        "machine were otherwise idle",
     )
     named_time: float = bounds(
-        0.5, "fraction of this time that named terms may use while all fits are poor"
+        0.5, "fraction of the time limit that named terms may use if all fits are poor"
     )
-    quick_iterations: int = bounds(
-        15, "maximum iterations in the first fit of a subset"
-    )
-    iterations: int = bounds(60, "maximum iterations in the fit of a leading subset")
-    heldout_iterations: int = bounds(
-        15, "maximum iterations in a fit to part of the recordings"
-    )
-    state_iterations: int = bounds(12, "maximum Newton steps if only states are fitted")
+    quick_iterations: int = bounds(15, "iteration limit for the first fit of a subset")
+    iterations: int = bounds(60, "iteration limit for the fit of a leading subset")
+    heldout_iterations: int = bounds(15, "iteration limit for fits to part of the data")
+    state_iterations: int = bounds(12, "limit on Newton steps in a fit of states alone")
     state_gain: float = bounds(
-        1e-3, "reduction of the cost below which these Newton steps end"
+        1e-3, "reduction of the cost per step below which a fit of states alone ends"
     )
     extended_subsets: int = bounds(
-        3, "number of subsets of each size that are extended"
+        3, "number of subsets of each size that are extended by a further term"
     )
-    fitted_subsets: int = bounds(6, "number of subsets fitted at each size above one")
+    fitted_subsets: int = bounds(6, "number of subsets fitted for each size above one")
     lead_bic: float = bounds(
-        50.0, "difference in BIC up to which a further subset or form is tried"
+        50.0, "a subset or form is tried if its BIC exceeds the best by at most this"
     )
     helpful_cost: float = bounds(
         0.7,
         "while the fit is poor, the search continues only if a term reduces the cost "
-        "to less than this fraction",
+        "to less than this fraction of its previous value",
     )
     clear_gain: float = bounds(
         10.0,
-        "if removing a term worsens the fit by more than this multiple of the required "
-        "gain, the loss is not computed accurately",
+        "if the estimated loss of fit without a term exceeds this multiple of the "
+        "required gain, the estimated loss is used and no refit is made",
     )
     astray_shift: float = bounds(
         3.0,
@@ -200,17 +199,17 @@ class Policy:
         2.0, "multiple of the smallest cost above which a fit is not refined further"
     )
     explained: float = bounds(
-        1.2, "cost per sample below which a fit is never stopped early"
+        1.2, "cost per sample below which slow convergence does not stop a fit"
     )
     crawl_steps: int = bounds(2, "number of steps used to detect slow convergence")
     crawl_attempts: int = bounds(
-        4, "minimum number of step attempts during these steps"
+        4, "convergence is slow only if the last steps took at least this many attempts"
     )
     crawl_gain: float = bounds(
-        0.01, "relative reduction of the cost below which these steps count as slow"
+        0.01, "convergence is slow only if the cost falls by less than this fraction"
     )
     late_attempts: int = bounds(
-        8, "step attempts after which the cost must be below that of the smaller subset"
+        8, "number of attempts within which a fit must improve on the subset it extends"
     )
     functions: int = bounds(
         2, "maximum number of free functions for unknown physics; 0: none"
@@ -220,28 +219,30 @@ class Policy:
     )
     worthwhile: float = bounds(
         0.1,
-        "if model errors are allowed for, fraction of the cost that a further function "
-        "must explain",
+        "if model errors are allowed for: minimum fraction of the cost that a further "
+        "function must explain",
     )
     element_misfit: float = bounds(
         0.1,
-        "if model errors are allowed for, elements with an internal state are tried "
-        "only if the cost with functions exceeds this fraction of the textbook model's",
+        "if model errors are allowed for: elements are tried only if the cost with "
+        "functions exceeds this fraction of the cost of the textbook model",
     )
     function_lengths: tuple[float, ...] = bounds(
         (0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
-        "correlation lengths of a free function, as fractions of the range of its "
+        "correlation lengths tried for a function, as fractions of the range of its "
         "argument or, for a phase, in radians",
     )
     function_sizes: tuple[float, ...] = bounds(
         (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6),
-        "amplitudes of a free function, in mean standard errors of its coefficients",
+        "amplitudes tried for a function, in mean standard errors of its coefficients",
     )
     promising: float = bounds(
-        0.5, "minimum gain of a free function that is fitted, relative to the largest"
+        0.5, "minimum predicted gain for a fit of a function, relative to the largest"
     )
     rivalling: float = bounds(
-        0.9, "the same minimum once a function has explained the data"
+        0.9,
+        "minimum predicted gain, relative to the largest, at which a further function "
+        "is fitted although the data are explained",
     )
     followed: int = bounds(
         3, "maximum number of functions, terms, forms or locations tried per stage"
@@ -251,36 +252,36 @@ class Policy:
     )
     negligible_residual: float = bounds(
         0.1,
-        "the search ends if the remaining excess cost is below this fraction of the "
-        "tolerated one",
+        "the search ends if the excess cost is below this fraction of the tolerated "
+        "cost",
     )
     prior_fits: int = bounds(
-        4, "maximum number of fits until the prior of a free function converges"
+        4, "maximum number of fits for the prior of a free function to converge"
     )
     element_fits: int = bounds(
         12,
-        "maximum number of additional fits for the parameters of an element, or for a "
-        "reference speed",
+        "maximum number of additional fits for the parameters of an element, or of "
+        "fits for a reference speed",
     )
     prior_settled: float = bounds(
-        1.5, "ratio of consecutive costs below which the prior has converged"
+        1.5, "ratio of consecutive costs below which a function's prior has converged"
     )
     bootstrap: int = bounds(
         200, "number of bootstrap samples, both of blocks and of drive signals"
     )
-    frequency_grid: int = bounds(
-        4, "number of frequencies per resolution cell of a scan"
-    )
+    frequency_grid: int = bounds(4, "number of scan frequencies per resolution cell")
     cause_strengths: tuple[float, float, int] = bounds(
         (0.1, 1.5, 24),
-        "strengths tried in a fit to event speeds: the first strength, the ratio of "
-        "consecutive strengths, and their number",
+        "strengths tried in a fit to transition speeds: the first, as a multiple of "
+        "the typical strength; the ratio of consecutive strengths; and their number",
     )
     cause_worse: float = bounds(
-        4.0, "multiple of the smallest misfit above which no further strength is tried"
+        4.0, "multiple of the smallest misfit above which no larger strength is tried"
     )
-    cause_difference: float = bounds(1e-3, "relative step of the finite differences")
-    cause_fits: int = bounds(40, "maximum number of evaluations in that fit")
+    cause_difference: float = bounds(
+        1e-3, "relative step for transition-speed derivatives"
+    )
+    cause_fits: int = bounds(40, "evaluation limit for a fit to transition speeds")
     trace_stride: float = bounds(
         0.1, "step in the trace of the monodromy matrix along a branch"
     )
@@ -292,12 +293,12 @@ class Policy:
         (1.1, 1.4),
         "multiples of the detachment speed that bracket the interruption of chatter",
     )
-    drawn_rigs: int = bounds(12, "number of rigs drawn to estimate prediction errors")
+    drawn_rigs: int = bounds(12, "number of rigs sampled to estimate prediction errors")
     next_speeds: int = bounds(7, "number of speeds compared for the next recording")
     next_beyond: float = bounds(
         0.05, "relative extension of the recorded speed range at either end"
     )
-    next_settle: float = bounds(6.0, "settling time (s) of a simulated rig")
+    next_settle: float = bounds(6.0, "settling time (s) before a simulated recording")
 
     # settings of the report
     ripple_errors: float = shows(
@@ -307,7 +308,7 @@ class Policy:
         1e-3, "significance level at which a recording shows a named effect"
     )
     decoy: float = shows(
-        0.5, "fraction of a function's gain that its decoy may reach without a caveat"
+        0.5, "fraction of a function's gain that its decoy may explain without a caveat"
     )
     units_doubted: float = shows(
         1000.0,
@@ -318,8 +319,8 @@ class Policy:
     )
     rival: float = shows(
         30.0,
-        "the recommended recording separates alternatives whose BIC is larger by less "
-        "than this",
+        "difference in BIC below which the recommended recording should separate an "
+        "alternative from the named terms",
     )
     absent_errors: float = shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"

@@ -45,7 +45,7 @@ class FilippovSystem(SwitchedSystem):
 
     @abc.abstractmethod
     def switching(self, t, state: Float[Array, " n"]) -> Float[Array, ""]:
-        """Return the scalar H that is zero on the surface."""
+        """Return the switching function, a scalar that is zero on the surface."""
 
     def branch(self, t, state: Float[Array, " n"], sides) -> Float[Array, " n"]:
         """Return the rate of change on one side of the surface.
@@ -56,6 +56,6 @@ class FilippovSystem(SwitchedSystem):
             sides: +1 above the surface or -1 below it, shape `(1,)`.
 
         Returns:
-            Rates per second, shape `(n,)`.
+            Rate of change of the state, shape `(n,)`.
         """
         return jnp.where(sides[0] > 0, self.above(t, state), self.below(t, state))

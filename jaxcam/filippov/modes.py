@@ -12,8 +12,8 @@ from ._system import FilippovSystem
 def surface_rates(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Return the rates of change of H along both fields, including the explicit
-    dependence of H on time (thesis, eq. 3.9).
+    """Return the rates of change of the switching function H along both vector fields,
+    including the explicit dependence of H on time (thesis, eq. 3.9).
 
     Args:
         system: The system.
@@ -45,7 +45,8 @@ def sliding_share(system: FilippovSystem, t, state) -> Float[Array, ""]:
 def sliding_field(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> Float[Array, " n"]:
-    """Return Filippov's convex combination of both fields, tangent to the surface.
+    """Return the sliding vector field: Filippov's convex combination of `above` and
+    `below`, which is tangent to the surface.
 
     Args:
         system: The system.
@@ -62,12 +63,14 @@ def sliding_field(
 def equivalent_control(
     system: FilippovSystem, t, state: Float[Array, " n"]
 ) -> tuple[Float[Array, ""], Float[Array, " n"]]:
-    """Return Utkin's equivalent control of x' = f + g u with u = 1 above and -1 below.
+    """Return Utkin's equivalent control u of x' = f + g u, where u is 1 above the
+    surface and -1 below it, so f is the mean of the two vector fields, and g is half
+    the difference `above` - `below`.
 
-    It solves H_t + H_x (f + g u) = 0 and is in [-1, 1] if the system slides. Because
-    the control enters linearly, the resulting field is that of Filippov. The control
-    is the mean output of a relay; for dry friction, its magnitude is the friction force
-    divided by its maximum.
+    With the switching function H, the control solves H_t + H_x (f + g u) = 0 and is in
+    [-1, 1] if the system slides. Because the control enters linearly, the resulting
+    field is that of Filippov. The control is the mean output of a relay; for dry
+    friction, its magnitude is the friction force divided by its maximum.
 
     Args:
         system: The system.
@@ -106,7 +109,7 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
         state: State, shape `(n,)`.
 
     Returns:
-        One of these words.
+        The kind of state, as one of these words.
     """
     above, below = (float(rate) for rate in surface_rates(system, t, state))
     if above == 0 or below == 0:

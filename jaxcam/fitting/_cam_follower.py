@@ -76,8 +76,8 @@ def rig_sensors(rig: Rig) -> dict[str, Sensor]:
 
 
 def cam_follower_parameters(rig: Rig, base=lambda system: system) -> list[Parameter]:
-    """Return the identifiable parameters of the rig: stiffness K (as K/J), spring, cam
-    and restitution.
+    """Return the identifiable parameters of the rig: stiffness K (as its ratio K/J to
+    the inertia J), spring, cam and restitution.
 
     The inertia is held fixed because only K/J affects the motion. The half height of
     the follower in the cam profile is also fixed, because only its sum with the cam

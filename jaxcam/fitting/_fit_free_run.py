@@ -35,7 +35,7 @@ class FreeRunFit:
     """Parameters that minimise the error of free runs."""
 
     model: Model
-    """The model with these parameters."""
+    """The model with the fitted parameters."""
     values: Mapping[str, float]
     """Values of the parameters by name."""
     runs: tuple[FreeRun, ...]

@@ -40,7 +40,9 @@ class Identifiability:
     """Combinations, one per row, each parameter in units of its scale, shape `(g, g)`.
     """
     stderr: Float[np.ndarray, " g"]
-    """Standard error of each combination from the data alone, in the same units."""
+    """Standard error of each combination from the data alone, in the units of
+    `directions`.
+    """
     values: Float[np.ndarray, " g"]
     """Parameter values at which the analysis was made."""
     scales: Float[np.ndarray, " g"]

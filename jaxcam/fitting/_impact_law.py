@@ -51,9 +51,9 @@ class ImpactLaw:
     best: str
     """Name of the law that the impacts support."""
     delta_bic: dict[str, float]
-    """BIC of each law minus that of the constant law; negative is better. A power law
-    in the direction that the impacts do not show counts as a constant law with one
-    extra parameter.
+    """BIC of each law minus that of the constant law; negative is better. For the power
+    law in the other direction, which fits no better than the constant one, the
+    difference is the penalty for one extra parameter.
     """
     p_value: float
     """p-value of the F test of the power law against a constant coefficient."""
@@ -172,13 +172,13 @@ class ImpactLaw:
 def impact_law(table: ImpactTable) -> ImpactLaw:
     """Return the restitution law that a table of impacts supports.
 
-    A constant coefficient of restitution and a power law, r = r0 (1 + v / v_ref)^-b
-    with the median speed as v_ref, are fitted by least squares. The scatter of
-    individual impacts is estimated from the data: either the separation speed or the
-    coefficient of restitution is assumed to have a constant standard deviation,
-    whichever is more likely. If the table states standard errors, the scatter is
-    assumed to be proportional to them. The power law is chosen if an F test rejects a
-    constant coefficient at the 1 % level.
+    A constant coefficient of restitution r and a power law, r = r0 (1 + v / v_ref)^-b
+    with the approach speed v and its median v_ref, are fitted by least squares. The
+    scatter of individual impacts is estimated from the data: either the separation
+    speed or the coefficient of restitution is assumed to have a constant standard
+    deviation, whichever is more likely. If the table states standard errors, the
+    scatter is assumed to be proportional to them. The power law is chosen if an F test
+    rejects a constant coefficient at the 1 % level.
 
     Args:
         table: The impacts.

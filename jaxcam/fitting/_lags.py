@@ -19,8 +19,8 @@ def without_lags(
     recordings: Sequence[Recording],
     lags: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Model, tuple[Recording, ...]]:
-    """Return recordings in which the samples of lagging channels have been moved, and
-    the model of these recordings.
+    """Return recordings in which the samples of lagging channels have been moved to
+    earlier times, and the model of these recordings.
 
     A fit expands the motion in powers of the lag, which fails if the lag is not short
     compared with the time scale of the motion, or if it contains an impact. A lag of

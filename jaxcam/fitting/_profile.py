@@ -15,7 +15,8 @@ from .engine import Weights
 class Profile:
     """The profile likelihood of one parameter.
 
-    The cost is below 3.84 inside the 95 % interval; `interval` is interpolated, and
+    The cost is below 3.84, the 95 % quantile of the chi-square distribution with one
+    degree of freedom, inside the 95 % interval; `interval` is interpolated, and
     infinite on a side where the cost does not reach this value.
     """
 
@@ -26,7 +27,7 @@ class Profile:
     cost: Float[np.ndarray, " k"]
     """Minus twice the log-likelihood, relative to the optimum, shape `(k,)`."""
     fits: tuple[Fit, ...]
-    """The fits at these values."""
+    """The fits with the parameter fixed at each of `values`."""
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -69,8 +70,9 @@ def profile(
         name: Name of the parameter.
         reach: Range of values on either side of the optimum, in standard errors.
         points: Number of values, including the optimum.
-        values: Values at which to fix the parameter instead, in any order; a value is
-            inside the 95 % interval if its cost is below 3.84.
+        values: Values at which to fix the parameter, in any order, instead of those
+            that `reach` and `points` define; a value is inside the 95 % interval if its
+            cost is below 3.84.
         weights: Weight of each piece of the data; use the same value as for `found`.
         prior: Whether tolerances count as prior knowledge; use the same value as for
             `found`.

@@ -51,9 +51,9 @@ class RestitutionFit:
     names: tuple[str, ...]
     """Names of the fitted parameters of the law."""
     values: Float[np.ndarray, " p"]
-    """Values of these parameters."""
+    """Fitted values, in the order of `names`."""
     stderr: Float[np.ndarray, " p"]
-    """Standard errors of these values."""
+    """Standard errors of `values`."""
     cost: float
     """Sum of squared residuals in units of the standard errors, with Huber's loss
     function.
@@ -136,10 +136,10 @@ def fit_restitution(
 ) -> RestitutionFit:
     """Fit parameters of a restitution law to the speeds before and after every impact.
 
-    The misfit of an impact is its separation speed minus r times its approach speed,
-    divided by the standard error of this difference, to which both speeds and the
-    surface speed contribute. The method is Levenberg-Marquardt (optimistix) with
-    Huber's loss function, which is linear for outliers.
+    The misfit of an impact is its separation speed minus the coefficient of restitution
+    times its approach speed, divided by the standard error of this difference, to which
+    both speeds and the surface speed contribute. The method is Levenberg-Marquardt
+    (optimistix) with Huber's loss function, which is linear for outliers.
 
     Args:
         segments: Segments from `segment_case` or `segment`.

@@ -44,8 +44,10 @@ class Arrival(eqx.Module):
     events: EventCounts
     """Numbers of events between start and end."""
     start: Bool[Array, " flags"]
-    """Mode at the start, shape `(m + 2 k,)`: constraints in contact, then surfaces on
-    whose negative side the motion starts, then surfaces along which it slides."""
+    """Mode at the start, shape `(m + 2 k,)` for m constraints and k switching surfaces:
+    constraints in contact, then surfaces on whose negative side the motion starts, then
+    surfaces along which it slides.
+    """
 
 
 def flow(
@@ -63,11 +65,12 @@ def flow(
     differentiated (`jvp`, `grad`, `linearize`, nested) with respect to state, times and
     parameters. A gradient costs one forward derivative per differentiation variable.
     Outside of transformations, the loop is compiled by LLVM, like that of
-    [`jaxcam.hybrid.simulate`][], and no step is repeated to end exactly at a release.
-    The numbers of impacts, contacts and releases may differ between batch elements. If
-    the start is invalid (a negative gap, a state that is not finite, or t1 < t0),
-    `code` gives the reason and the final state is NaN. Outside of transformations, the
-    settings and the system are checked first.
+    [`jaxcam.hybrid.simulate`][]; the state at a release is then computed by a series.
+    Inside transformations, the step is repeated so that it ends exactly at the release,
+    as derivatives require. The numbers of impacts, contacts and releases may differ
+    between batch elements. If the start is invalid (a negative gap, a state that is not
+    finite, or t1 < t0), `code` gives the reason and the final state is NaN. Outside of
+    transformations, the settings and the system are checked first.
 
     Args:
         system: The system to simulate.

@@ -34,8 +34,9 @@ class Settings(eqx.Module):
     """
     chatter_smallness: FloatScalar = 1e-3
     """Chatter is completed analytically only if lambda/(1 - r) is below this value,
-    with lambda = u |j| / a^2 for rebound speed u, jerk j and acceleration a. The
-    relative error of the completed time is about the square of this value.
+    with lambda = u |j| / a^2 for rebound speed u, jerk j, normal acceleration a and
+    coefficient of restitution r. The relative error of the completed time is about the
+    square of this value.
     """
     chatter_depth: FloatScalar = 1e-6
     """Chatter is completed analytically only after the speed has fallen to this

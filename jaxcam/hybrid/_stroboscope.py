@@ -48,7 +48,7 @@ class Stroboscope(Printed):
     hits: np.ndarray
     """Impacts in each sampled period, shape `(trajectories, turns - skip)`."""
     rests: np.ndarray
-    """Completed chatter sequences in each sampled period, same shape."""
+    """Completed chatter sequences in each sampled period, in the shape of `hits`."""
 
     def _table(self) -> ShortTable:
         failed = int(np.count_nonzero(self.code))

@@ -72,7 +72,8 @@ class SwitchedSystem(HybridSystem):
                 of the switching functions, as in `jnp.where(sides[0] > 0, ...)`.
 
         Returns:
-            Rates per second, shape `(n,)`; smooth in time and state for fixed sides.
+            Rate of change of the state, shape `(n,)`; smooth in time and state for
+            fixed sides.
         """
 
     def branches(
@@ -88,7 +89,7 @@ class SwitchedSystem(HybridSystem):
             sides: +1 or -1, one row for each combination, shape `(rows, k)`.
 
         Returns:
-            Rates per second, shape `(rows, n)`.
+            Rates of change of the state, shape `(rows, n)`.
         """
         return jax.vmap(lambda one: self.branch(t, state, one))(sides)
 

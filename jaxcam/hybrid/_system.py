@@ -61,7 +61,7 @@ class HybridSystem(eqx.Module):
             state: State, shape `(n,)`.
 
         Returns:
-            Rates of change (per second), shape `(n,)`.
+            Rate of change of the state, shape `(n,)`.
         """
 
     @abc.abstractmethod
@@ -107,11 +107,11 @@ class HybridSystem(eqx.Module):
         """Return the times at which a function may change abruptly (s), or `None`.
 
         The shape is `(k,)`. Steps end exactly at these times, so within a step the
-        vector field, gap and impact law are evaluated on only one side of each, and a
-        switch may be written with `jnp.where(t < b, ...)`. In a system with a `period`,
-        these times repeat in every period, at `b + k * period`. Declare a brief force
-        by the times at which it begins and ends. Keep the number small, because each
-        time adds operations to every step.
+        vector field, gap and impact law are evaluated on only one side of each time
+        `b`, and a switch may be written with `jnp.where(t < b, ...)`. In a system with
+        a `period`, these times repeat in every period, at `b + i * period` for every
+        integer i. Declare a brief force by the times at which it begins and ends. Keep
+        the number small, because each time adds operations to every step.
         """
         return None
 

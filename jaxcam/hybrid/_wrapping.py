@@ -10,7 +10,7 @@ from ._system import HybridSystem
 
 
 class Wrapping(HybridSystem):
-    """A system that contains another one, `inner`, and forwards what that declares: its
+    """A system that contains another one, `inner`, and forwards its declarations:
     period, breakpoints, names, `active`, preparation and check.
 
     Subclass it to change some of the functions of any system: store the system in a

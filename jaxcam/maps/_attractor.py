@@ -11,18 +11,20 @@ from ..parameters import real_array
 
 
 class Attractor(NamedTuple):
-    """The attractor of an orbit."""
+    """The attractor to which an orbit converges."""
 
     period: int
     """Smallest detected period; 0 if there is none."""
     lyapunov: float
-    """Lyapunov exponent, the mean of log |f'| along the orbit: positive in chaos."""
+    """Lyapunov exponent: the mean of log |f'| along the orbit of the map f, positive
+    for a chaotic orbit.
+    """
     bounded: bool
     """Whether the orbit stayed finite."""
 
     @property
     def kind(self) -> str:
-        """The kind as text."""
+        """The kind of attractor, in words."""
         if not self.bounded:
             return "none"
         if self.period == 1:

@@ -26,11 +26,11 @@ def superstable(
     starting from an extrapolation of the previous ones.
 
     Args:
-        system: The map, a module.
+        system: The map, an `equinox.Module`.
         where: Selects the parameter.
-        critical: The critical point.
-        first: Initial guesses for the first two parameters.
-        count: Number of parameters.
+        critical: The critical point, at which the derivative of the map is zero.
+        first: Initial guesses for the first two parameter values.
+        count: Number of parameter values.
 
     Returns:
         The parameter values, shape `(count,)`.
@@ -68,7 +68,7 @@ def feigenbaum_ratios(parameters: Float[np.ndarray, " n"]) -> Float[np.ndarray, 
     eq. 2.17).
 
     Args:
-        parameters: Parameters m_k of a period-doubling cascade, shape `(n,)`.
+        parameters: Parameter values m_k of a period-doubling cascade, shape `(n,)`.
 
     Returns:
         Ratios, shape `(n - 2,)`.

@@ -43,7 +43,7 @@ def map_diagram(
     """Return the steady-state orbit from a given start for each value of a parameter.
 
     Args:
-        system: The map, a module.
+        system: The map, an `equinox.Module`.
         where: Selects the parameter.
         values: Values of the parameter, shape `(values,)`.
         start: First point.

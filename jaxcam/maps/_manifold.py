@@ -84,7 +84,8 @@ def grow_manifold(
     spacing: float = 0.01,
     start: float = 1e-5,
 ) -> Float[np.ndarray, "points 2"]:
-    """Return one side of the unstable manifold of a saddle, as a curve from the saddle.
+    """Return one branch of the unstable manifold of a saddle, as a curve from the
+    saddle.
 
     The curve consists of a short segment along the unstable direction and the images of
     that segment. Points are added to the segment wherever the images of neighbouring
@@ -95,7 +96,7 @@ def grow_manifold(
     Args:
         system: The map, traceable by JAX.
         point: The saddle, shape `(2,)`.
-        direction: Unstable direction, whose sign chooses the side, shape `(2,)`.
+        direction: Unstable direction, whose sign chooses the branch, shape `(2,)`.
         length: Length of the curve.
         spacing: Largest distance between neighbouring points.
         start: Distance from the saddle at which the curve begins; its square is the
@@ -107,7 +108,7 @@ def grow_manifold(
             together there.
 
     Raises:
-        ValueError: The map does not stretch the direction.
+        ValueError: The map does not expand along the direction.
 
     Examples:
         >>> from jaxcam.maps import grow_manifold

@@ -46,7 +46,7 @@ class PiecewiseMap(eqx.Module):
 
 
 class SkewMap(PiecewiseMap):
-    """Skew map x -> a x + mu for x <= 0, b x + mu + jump for x > 0.
+    """Skew tent map x -> a x + mu for x <= 0, b x + mu + jump for x > 0.
 
     It is the normal form of a border collision if `jump` is zero, and that of a
     discontinuous map otherwise (thesis, Figure 2.11 (a) and (b)).
@@ -78,7 +78,7 @@ class SkewMap(PiecewiseMap):
 class SquareRootMap(PiecewiseMap):
     """Square-root map x -> a x + mu for x <= 0, mu - root sqrt(x) for x > 0.
 
-    It is the form of the Poincaré map near a grazing impact (thesis, Figure 2.11 (c)).
+    The Poincaré map near a grazing impact has this form (thesis, Figure 2.11 (c)).
 
     Examples:
         >>> from jaxcam.maps import SquareRootMap

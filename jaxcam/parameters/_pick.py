@@ -42,7 +42,7 @@ class Pick:
     leaves: tuple[int, ...]
     """Positions of the selected parameters among the leaves of the tree."""
     names: tuple[str, ...]
-    """Dotted names of these parameters, such as `speed` or `profile.radius`."""
+    """Dotted names of the selected parameters, such as `speed`, `profile.radius`."""
     several: bool = False
     """Whether a call returns a tuple."""
 

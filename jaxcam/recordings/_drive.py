@@ -29,13 +29,13 @@ class Drive:
     speed: float
     """Slope (rad/s) of the straight line `speed * time + phase` fitted to the angle."""
     phase: float
-    """Value (rad) of this line at time zero."""
+    """Value (rad) of the line `speed * time + phase` at time zero."""
     noise: float
     """Standard deviation of the raw samples about the smoothed angle (rad)."""
     window: int
     """Number of samples in each smoothing parabola."""
     acceleration: DriveAcceleration
-    """Angular acceleration, estimated over a longer time than the rate."""
+    """Angular acceleration, estimated over a longer window than the rate."""
 
     @property
     def clock(self) -> Float[np.ndarray, " k"]:

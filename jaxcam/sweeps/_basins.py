@@ -46,8 +46,8 @@ def basins(
         turns: Number of periods simulated.
         keep: Number of final samples used; periods up to `keep / 2` are detected.
         period_tolerance: Tolerance for detecting periods.
-        same: Orbits that differ by less than this, in units of `scale`, count as the
-            same attractor.
+        same: Orbits that differ by less than this value, in units of `scale`, count as
+            the same attractor.
         reruns: Number of extensions of non-periodic runs, each twice as long as the
             previous one.
         scale: Scale of the motions, shape `(n,)`; default: the largest extent or

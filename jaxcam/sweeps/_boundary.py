@@ -31,7 +31,7 @@ class Uncertainty(NamedTuple):
     distance: np.ndarray
     """Distances used in the fit (cells)."""
     fraction: np.ndarray
-    """Fraction of uncertain states at these distances."""
+    """Fraction of uncertain states at each `distance`."""
 
 
 def basin_entropy(attractor, box: int = 5) -> BasinEntropy:

@@ -52,7 +52,7 @@ def diagram(
         keep: Number of final periods to keep.
         direction: With "each", the motions at all values start from the same state.
             With "up", "down" or "both", each motion starts from the final state of the
-            motion at the previous value, so that hysteresis shows.
+            motion at the previous value, so that hysteresis becomes visible.
         dwell: Settling time and recording time (s) at each value, instead of `turns`
             and `keep`.
         period_tolerance: Tolerance for detecting periods.

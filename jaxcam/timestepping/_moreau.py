@@ -18,7 +18,8 @@ from .complementarity import explain, lemke
 
 
 class SteppedMotion(NamedTuple):
-    """A motion at the ends of its steps; the first row is the start.
+    """A motion sampled at the ends of the time steps; the first row is the initial
+    state.
 
     Examples:
         >>> from jaxcam.models import BouncingBall
@@ -32,7 +33,9 @@ class SteppedMotion(NamedTuple):
     state: Float[Array, "times n"]
     """States, shape `(steps + 1, n)`."""
     percussion: Float[Array, "steps m"]
-    """Change of each normal velocity due to impacts and contact, shape `(steps, m)`."""
+    """Jump of each normal velocity in each step due to the percussion (impulse) at its
+    own constraint, shape `(steps, m)`.
+    """
     gap: Float[Array, "times m"]
     """Gaps, shape `(steps + 1, m)`."""
 
@@ -61,8 +64,8 @@ def moreau(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> SteppedMotion:
-    """Simulate from `t0` to `t1` in `steps` time steps without event detection
-    (Moreau).
+    """Simulate from `t0` to `t1` in `steps` steps by Moreau's time-stepping scheme,
+    without event detection.
 
     Each step integrates free flight by the midpoint rule. If the step ends with a
     constraint violated, the velocities jump at mid-step according to a complementarity
@@ -84,7 +87,7 @@ def moreau(
         A [`jaxcam.timestepping.SteppedMotion`][].
 
     Raises:
-        ValueError: A step has no solution, or the motion is not finite.
+        ValueError: A step has no solution, or the state becomes infinite or NaN.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

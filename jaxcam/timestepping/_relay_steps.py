@@ -16,7 +16,9 @@ from .relay import is_p_matrix, relay_problem, RelaySystem
 
 
 class RelayMotion(NamedTuple):
-    """Motion of a relay system at the ends of the steps; the first row is the start."""
+    """Motion of a relay system, sampled at the ends of the time steps; the first row is
+    the initial state.
+    """
 
     time: Float[Array, " times"]
     """Times (s), shape `(steps + 1,)`."""

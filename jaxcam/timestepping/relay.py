@@ -20,8 +20,9 @@ class RelaySystem(eqx.Module):
     """Linear system with relays: x' = A x + B u, y = C x + D u, where each u_i is the
     output of a relay controlled by y_i.
 
-    The output u is 1 for y < 0, -1 for y > 0, and any value in between for y = 0, as
-    sliding requires (thesis, eq. 3.1). D is zero by default.
+    The relay output u_i, which is an input of the linear system, is 1 for y_i < 0, -1
+    for y_i > 0, and any value in between for y_i = 0, as sliding requires (thesis, eq.
+    3.1). D is zero by default.
 
     Raises:
         ValueError: The shapes are inconsistent.
@@ -69,7 +70,7 @@ def relay_problem(
         vector: q, shape `(m,)`.
 
     Returns:
-        u and y, shape `(m,)`, and the code with which the pivoting ended.
+        u and y, both of shape `(m,)`, and the result of Lemke's method.
     """
     m = vector.shape[0]
     eye = jnp.eye(m, dtype=vector.dtype)
@@ -81,8 +82,8 @@ def relay_problem(
 
 
 def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
-    """Return whether all principal minors are positive, so that every solution is
-    unique.
+    """Return whether all principal minors are positive, so that the linear
+    complementarity problem has a unique solution for every vector q.
 
     Args:
         matrix: Shape `(m, m)`.

@@ -78,10 +78,10 @@ def beta_map(lam, r) -> Float[Array, "..."]:
         r: Coefficient of restitution in (0, 1), broadcast against `lam`.
 
     Returns:
-        Beta, dimensionless (thesis, eq. 6.97): 0 up to lambda_bar, then lobes between
-            square-root corners, each wider than the previous one by the factor 1/q and
-            higher by the factor 1/p^2, with the scales p and q of
-            [`variational.scaling_law`][] (thesis, eq. 6.49).
+        Beta, dimensionless (thesis, eq. 6.97): 0 up to the fixed point lambda_bar of
+            the lambda-map, then lobes between square-root corners, each wider than the
+            previous one by the factor 1/q and higher by the factor 1/p^2, with the
+            scales p and q of [`variational.scaling_law`][] (thesis, eq. 6.49).
 
     Examples:
         >>> from variational import beta_map

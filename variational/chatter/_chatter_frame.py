@@ -80,7 +80,8 @@ class ChatterFrame(eqx.Module):
 
         Returns:
             Gap and velocity, shape `(2,)` (thesis, eqs. 6.94-6.96); unlike in eq. 6.55,
-                the term of order tau*^3 is retained.
+                the term of third order in the time of the impact relative to release is
+                retained.
         """
         tau, after = time - self.release, section - self.release
         parts = beta_parts(self.coordinate(time, speed), self.restitution)
@@ -161,8 +162,9 @@ def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> Chatter
     """Return the derivatives of the release point and the scales with respect to a
     parameter.
 
-    In the result, `release` is the derivative of the release time and `jerk` that of c
-    (thesis, eqs. 6.114 and 6.115, where they are estimated from perturbed simulations).
+    In the result, `release` is the derivative of the release time and `jerk` that of
+    the jerk c at release (thesis, eqs. 6.114 and 6.115, where they are estimated from
+    perturbed simulations).
 
     Args:
         system: A system with two states, one constraint and a period.

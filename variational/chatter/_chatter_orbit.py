@@ -89,11 +89,13 @@ def chatter_accumulation(
 
     After sticking, the motion does not depend on the past: the orbit leaves the release
     point with zero relative velocity. The chatter is interrupted if `accumulation`
-    reaches the last release; `margin` is a smooth form of that condition. With K the
+    reaches the last release; `margin` is a smooth form of that condition. Let K be the
     coordinate in which the lambda-map is a multiplication by 1/q
-    ([`variational.koenigs`][]), q^k K(lambda_k) is the same for every impact k of the
-    last period, up to terms of order q^k tau_k, and is zero at the interruption. The
-    function is pure: it can be compiled, batched and differentiated in forward mode.
+    ([`variational.koenigs`][]), lambda_k the value of lambda at impact k, and tau_k the
+    time of that impact relative to release. Then q^k K(lambda_k) is the same for every
+    impact of the last period, up to terms of order q^k tau_k, and is zero at the
+    interruption. The function is pure: it can be compiled, batched and differentiated
+    in forward mode.
 
     Args:
         system: A system with two states, one constraint and a period.

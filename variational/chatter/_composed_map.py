@@ -59,7 +59,7 @@ class ComposedMap(eqx.Module):
     section: Float[Array, ""]
     """Time of the section at the end of the period (s)."""
     state: Float[Array, "2"]
-    """State, at this section, of the orbit that starts from contact at release, shape
+    """State at the section of the orbit that starts from contact at release, shape
     `(2,)`.
     """
     relative: Float[Array, "2"]
@@ -177,8 +177,9 @@ def composed_map(
         where: Selects the parameter.
         rank: Number of the impact D* after release, counted from 0. The later D* is,
             the better the lambda-map describes the following impacts, but the smaller
-            the deviations for which the linear maps A and C are valid: a deviation must
-            change the time of D* by much less than tau*.
+            the deviations for which the linear maps A and C (fields `matrix` and
+            `covector` of the result) are valid: a deviation must change the time of D*
+            by much less than the time from D* to release.
         phase: Phase of the section, in periods; the section must lie in the flight
             after release.
 

@@ -34,9 +34,9 @@ class Lobes(eqx.Module):
     points: np.ndarray
     """Points of each lobe, from its outer corner inwards, shape `(k, samples)`."""
     images: np.ndarray
-    """Values of the map at these points, shape `(k, samples)`."""
+    """Values of the map at `points`, shape `(k, samples)`."""
     slopes: np.ndarray
-    """Slope of the map at these points, shape `(k, samples)`."""
+    """Slope of the map at `points`, shape `(k, samples)`."""
     accumulation: float
     """Point at which the lobes accumulate."""
     limit: float
@@ -44,9 +44,9 @@ class Lobes(eqx.Module):
     scan: np.ndarray
     """Points of the sampled map, shape `(n,)`."""
     scanned: np.ndarray
-    """Values of the map at these points, shape `(n,)`."""
+    """Values of the map at the points of `scan`, shape `(n,)`."""
     impacts: np.ndarray
-    """Number of impacts at these points, shape `(n,)`."""
+    """Number of impacts at the points of `scan`, shape `(n,)`."""
 
 
 def find_lobes(
@@ -63,8 +63,8 @@ def find_lobes(
 ) -> Lobes:
     """Sample the stroboscopic map around the interruption and find its lobes.
 
-    A lobe ends where the number of impacts changes; the ends are located to within
-    rounding error (thesis, eq. 5.1).
+    A lobe is a part of the map on which the number of impacts per period is constant;
+    its ends are located to within rounding error (thesis, eq. 5.1).
 
     Args:
         system: A system as for [`variational.chatter_frame`][], near the interruption.

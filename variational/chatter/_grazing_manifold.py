@@ -46,7 +46,8 @@ class GrazingManifold(eqx.Module):
 def grazing_manifold(
     system: HybridSystem, n: int = 4, points: int = 200, horizon: float = 2.0
 ) -> GrazingManifold:
-    """Return the pre-images S^k and images W^k of the line of zero-speed impacts.
+    """Return the pre-images S^k and images W^k, under the impact map, of the line of
+    zero-speed impacts.
 
     The line contains only times outside the sticking set Z. At these times, contact
     cannot last: a motion that grazes leaves the constraint again (thesis, eqs.
@@ -120,8 +121,9 @@ def chattering_region(
     """Return the upper boundary of the region D in which chatter is complete.
 
     The boundary C consists of impacts whose sequence accumulates exactly at release.
-    Close to release, it is the parabola v = lambda_bar c tau^2, with the time tau from
-    release and the jerk c at release. The boundary is invariant under the impact map,
+    Close to release, it is the parabola v = lambda_bar c tau^2, with the rebound speed
+    v, the time tau from release, the jerk c at release, and the fixed point lambda_bar
+    of [`variational.scaling_law`][]. The boundary is invariant under the impact map,
     whose inverse extends it backwards in time (thesis, eqs. 6.20 and 6.91).
 
     Args:

@@ -61,8 +61,8 @@ class Interruption(eqx.Module):
     converged: Bool[Array, ""]
     """Whether the bracket was reduced to rounding error."""
     ends: Float[Array, "2"]
-    """Margin at both ends of the bracket, shape `(2,)`: negative where chatter is
-    complete, positive where it is interrupted.
+    """Margin of [`variational.chatter_accumulation`][] at both ends of the bracket,
+    shape `(2,)`: negative where chatter is complete, positive where it is interrupted.
     """
     slope: Float[Array, ""]
     """Derivative of the margin with respect to the parameter at `value`."""
@@ -76,9 +76,10 @@ def interruption_in(
     """Find the interruption of chatter between two values of a parameter.
 
     This function is for use inside `jit`. A safeguarded Newton's method finds the zero
-    of the margin. The result can be differentiated in forward mode with respect to
-    every other parameter of the system (implicit function theorem). No error is raised;
-    `converged` is false if the margin does not change sign.
+    of the margin of [`variational.chatter_accumulation`][]. The result can be
+    differentiated in forward mode with respect to every other parameter of the system
+    (implicit function theorem). No error is raised; `converged` is false if the margin
+    does not change sign.
 
     Args:
         system: A system with two states, one constraint and a period.
@@ -196,8 +197,8 @@ def chatter_interruption(
 
     There, the impacts of the orbit that sticks once in `periods` forcing periods
     accumulate exactly at release. On one side, the orbit is periodic and sticks; on the
-    other side, it no longer sticks, and there are lobes with periodic windows and chaos
-    (thesis, section 5.4 and chapter 6).
+    other side, it no longer sticks, and the map over one period has infinitely many
+    lobes, with periodic windows and chaos (thesis, section 5.4 and chapter 6).
 
     Args:
         system: A system with two states, one constraint and a period.

@@ -27,7 +27,7 @@ def _root(lam):
 
 def hop_ratio(lam) -> Float[Array, "..."]:
     """Return h(lambda), the ratio of the times, relative to release, of the next impact
-    and this one.
+    and this one; [`variational.lambda_map`][] defines lambda.
 
     Args:
         lam: Coordinate lambda, dimensionless, any shape, between 0 and 3/8.
@@ -41,6 +41,9 @@ def hop_ratio(lam) -> Float[Array, "..."]:
 
 def lambda_map(lam, r) -> Float[Array, "..."]:
     """Return f(lambda), the coordinate of the next impact (thesis, eqs. 6.36 and 6.89).
+
+    An impact at time tau relative to release, with rebound speed v, has the coordinate
+    lambda = v / (c tau^2), where c is the jerk at release.
 
     Args:
         lam: Coordinate lambda, dimensionless, any shape, between 0 and 3/8.
@@ -64,6 +67,8 @@ def lambda_map(lam, r) -> Float[Array, "..."]:
 def lambda_inverse(lam, r) -> Float[Array, "..."]:
     """Return the coordinate of the previous impact: f(lambda_inverse(lam, r)) = lam.
 
+    The map f is [`variational.lambda_map`][], which also defines lambda.
+
     Args:
         lam: Coordinate lambda, dimensionless, >= 0.
         r: Coefficient of restitution.
@@ -86,10 +91,11 @@ def lambda_inverse(lam, r) -> Float[Array, "..."]:
 def koenigs(lam, lambda_bar, r, q) -> Float[Array, ""]:
     """Return the coordinate in which the lambda-map is a multiplication.
 
-    It satisfies K(f(lambda)) = K(lambda)/q, and is the limit of (f^-n(lambda) -
-    lambda_bar) q^-n. K is zero at lambda_bar, with slope one; it is negative if chatter
-    is completed before release, and positive otherwise (G. Koenigs' linearisation of a
-    map at a fixed point).
+    This coordinate, K, satisfies K(f(lambda)) = K(lambda)/q, where f is
+    [`variational.lambda_map`][], and is the limit of (f^-n(lambda) - lambda_bar) q^-n.
+    K is zero at lambda_bar, with slope one; it is negative if chatter is completed
+    before release, and positive otherwise (G. Koenigs' linearisation of a map at a
+    fixed point).
 
     Args:
         lam: Coordinate lambda, a dimensionless scalar >= 0.

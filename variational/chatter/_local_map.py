@@ -56,8 +56,8 @@ class LocalMap(eqx.Module):
         return smooth + self.root * jnp.sqrt(jnp.abs(self.delta_x) * inside)
 
     def __call__(self, x) -> Float[Array, "..."]:
-        """Evaluate the map: constant beyond the accumulation, otherwise lobe j (thesis,
-        eq. 5.4).
+        """Evaluate the map: constant beyond the accumulation, otherwise the lobe that
+        contains `x` (thesis, eq. 5.4).
 
         The result is NaN beyond `x_0`, the outer end of the first lobe, where the fit
         is not valid.

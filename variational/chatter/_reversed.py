@@ -53,7 +53,7 @@ class Reversed(Wrapping):
             state: State, shape `(n,)`.
 
         Returns:
-            Rates per second, shape `(n,)`.
+            Rate of change of the state, shape `(n,)`.
         """
         return -self.forward.vector_field(-jnp.asarray(t), state)
 

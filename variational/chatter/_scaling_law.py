@@ -9,7 +9,11 @@ from jaxtyping import Array, Float
 
 
 class ScalingLaw(eqx.Module):
-    """Fixed point of the lambda-map, and the scales that follow from it."""
+    """Fixed point of the lambda-map, and the scales that follow from it.
+
+    f is [`variational.lambda_map`][], h is [`variational.chatter.hop_ratio`][], and
+    beta is [`variational.beta_map`][].
+    """
 
     lambda_bar: Float[Array, "..."]
     """Fixed point: impacts with this lambda accumulate exactly at release (thesis,
@@ -33,8 +37,8 @@ def scaling_law(r) -> ScalingLaw:
     With s = sqrt(1 - 8 lambda / 3), the fixed point of the map in the thesis, eq. 6.36,
     is a root of 9 s^3 + 3 s^2 - (5 + 8 r) s + 1 in (1/3, 1). The other positive root
     has p < 0: it corresponds to an impact after release, so it is not a fixed point of
-    an actual motion. With the first root,
-    p = (3 s - 1)/2 and 1/q = (1 + s)^2/(4 s^2 p).
+    an actual motion. With the first root, p = (3 s - 1)/2, 1/q = (1 + s)^2/(4 s^2 p)
+    and kappa = 2 ln p/ln q.
 
     Args:
         r: Coefficient of restitution of slow impacts, any shape.

@@ -13,9 +13,10 @@ class Shooting(AbstractShooting):
     impacts (thesis, eq. 3.42).
 
     The unknowns u are, for each impact, its phase (time in forcing periods) and the
-    state after it: shape `(m (1 + n),)`. Without impacts, they are the state at time
-    zero, shape `(n,)`. For a system without forcing, the first phase is zero, the
-    period (s) takes its place, and phases are in periods of the orbit.
+    state after it; for m impacts of a system with n states, their shape is
+    `(m (1 + n),)`. Without impacts, they are the state at time zero, shape `(n,)`. For
+    a system without forcing, the first phase is zero, the period (s) takes its place,
+    and phases are in periods of the orbit.
     """
 
     constraints: tuple[int, ...] = eqx.field(static=True)

@@ -48,7 +48,7 @@ class Seen(NamedTuple):
     times: Float[Array, "flights nodes"]
     """Times at the ends of all steps (s), shape `(flights, 1 + steps)`."""
     states: Float[Array, "flights nodes n"]
-    """States at these times, shape `(flights, 1 + steps, n)`."""
+    """States at `times`, shape `(flights, 1 + steps, n)`."""
 
 
 class AbstractShooting(eqx.Module):

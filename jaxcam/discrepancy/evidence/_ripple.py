@@ -35,7 +35,7 @@ class Ripple:
     psi_stderr: float
     """Standard error of `psi`."""
     gain: float
-    """Gain in twice the log-likelihood, beyond the leakage of the speed drift."""
+    """Gain in twice the log-likelihood, in excess of that from leakage of the drift."""
     p_value: float
     """Probability of such a gain without ripple."""
     count: int

@@ -76,7 +76,7 @@ class Structure:
     value: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
-    """The shape at these values, in `unit`."""
+    """The shape at the values in `grid`, in `unit`."""
     stderr: Float[np.ndarray, " k"] = dataclasses.field(
         default_factory=lambda: np.zeros(0)
     )
@@ -99,8 +99,9 @@ class Structure:
     """Whether it certainly differs from recording to recording: a separate value for
     each recording explains significantly more."""
     named: Mapping[str, Beside] = dataclasses.field(default_factory=dict)
-    """Far from the data, the loss of fit without each named term: in the present fit,
-    and if the structure is fitted as well."""
+    """If the fit is poor: the loss of fit that the omission of each named term causes,
+    in the present fit and with the structure fitted as well.
+    """
 
     @property
     def significant(self) -> bool:

@@ -140,8 +140,8 @@ def _sound(trial: Missing, one: Free) -> bool:
 def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     """Return whether the cost of a fit is no larger than the noise explains.
 
-    **Arguments:** `small`: the tolerated residual; a fraction `Policy.enough` of it is
-    treated as noise.
+    **Arguments:** `small`: the tolerated residual; a fraction
+    `Policy.negligible_residual` of it is treated as noise.
     """
     samples = found.problem.samples
     surplus = fits.policy.cost_errors * math.sqrt(2 * samples)

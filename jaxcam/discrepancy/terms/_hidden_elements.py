@@ -79,7 +79,7 @@ class HiddenElement(eqx.Module):
 
 
 class Resonator(HiddenElement):
-    """A resonator driven by the position, `z'' + 2 D w z' + w^2 z = q`.
+    """A resonator driven by the position q, `z'' + 2 D w z' + w^2 z = q`.
 
     The force is `by_state * z + by_rate * z'`, with `w = 2 pi frequency` and the
     damping ratio D.
@@ -133,7 +133,10 @@ def _complex(real, imaginary):
 
 
 class Relaxation(HiddenElement):
-    """A spring and a dashpot in series (Maxwell): `z' = v - z / time`, force `k z`."""
+    """A spring and a dashpot in series (Maxwell): `z' = v - z / time`.
+
+    Here v is the velocity of the coordinate. The force is `by_state * z`.
+    """
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)
     """Names of the components of the internal state."""
@@ -168,9 +171,10 @@ class Relaxation(HiddenElement):
 class Hysteresis(HiddenElement):
     """Bouc-Wen hysteresis, `z' = v (1 - c (b sign(v z) + 1 - b) |z / limit|^n)`.
 
-    The force is `by_state * z`; b is `beta`, n is `power`, c is `loading`. With
-    s = `|z / limit|^n`, the slope dz/dq is `1 - c s` during loading and
-    `1 - c (1 - 2 b) s` during unloading (Wen 1976, with beta + gamma = c).
+    Here v is the velocity of the coordinate q. The force is `by_state * z`; b is
+    `beta`, n is `power`, c is `loading`. With s = `|z / limit|^n`, the slope dz/dq is
+    `1 - c s` during loading and `1 - c (1 - 2 b) s` during unloading (Wen 1976, where
+    beta + gamma corresponds to c).
     """
 
     names: ClassVar[tuple[str, ...]] = ("hidden",)

@@ -172,7 +172,7 @@ class Term(eqx.Module):
     """Name of the speed in `References` that scales the form of the term, if any. A
     speed that a rig file does not state is fitted once the term is named."""
     corner: ClassVar[bool] = False
-    """Whether the force jumps, like dry friction, and is therefore smoothed."""
+    """Whether the force jumps, as dry friction does, and is therefore smoothed."""
     acts: ClassVar[tuple[str, ...]] = ()
     """Parts of the model in which the term acts."""
     coordinate: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)

@@ -64,22 +64,22 @@ class LinearPieces(NamedTuple):
     information: Float[Array, "k a a"]
     """Information of the samples of each piece in flight, shape `(k, a, a)`."""
     slope: Float[Array, "k a"]
-    """Gradient of the cost of these samples, shape `(k, a)`."""
+    """Gradient of the cost of the samples of each piece in flight, shape `(k, a)`."""
     pp: Float[Array, "m m"]
     """Information of all samples in contact on the parameters, shape `(m, m)`."""
     p: Float[Array, " m"]
-    """Gradient of the cost of these samples, shape `(m,)`."""
+    """Gradient of the cost of all samples in contact, shape `(m,)`."""
     later: Float[Array, "k e n"]
     """Derivatives of each joint's mismatch with respect to the state after the joint,
     in units of the error of the joint.
     """
     earlier: Float[Array, "k e a"]
     """Derivatives of each joint's mismatch with respect to the columns of the previous
-    piece, in the same units.
+    piece, in units of the error of the joint.
     """
     direct: Float[Array, "k e m"]
     """Derivatives of each joint's mismatch with respect to the parameters at fixed
-    states, in the same units.
+    states, in units of the error of the joint.
     """
     tied: Float[Array, "k e"]
     """Mismatch at each joint, in units of its error."""

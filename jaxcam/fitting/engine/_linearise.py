@@ -67,7 +67,9 @@ class Blocks(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """Minus twice the log-likelihood of each piece and joint."""
+    """Minus twice the log-likelihood of each piece, and of each joint (the continuity
+    condition between two pieces).
+    """
 
     flown: Float[Array, "r k"]
     """Cost of each piece in flight, shape `(r, k)`."""

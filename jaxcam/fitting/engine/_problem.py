@@ -89,7 +89,10 @@ _STEPS, _MOST_STEPS = 10, 160
 
 
 class Weights(eqx.Module):
-    """Weights of the data of each piece: `(r, k)` in flight, `(r, kc)` in contact."""
+    """Weights of the data of each piece.
+
+    There are r recordings, each with at most k pieces in flight and kc in contact.
+    """
 
     flown: Float[np.ndarray, "r k"]
     """Weight of each piece in flight, shape `(r, k)`."""

@@ -9,7 +9,7 @@ class Field:
     """Selects a number of a system or a model: `Field("spring.stiffness")`.
 
     Two fields of the same name are equal and have the same hash, so problems of the
-    same rig share compiled programs; with separate `lambda` functions they would not.
+    same rig share compiled programs; separate `lambda` functions would prevent this.
     """
 
     name: str

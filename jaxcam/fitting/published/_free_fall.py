@@ -40,8 +40,9 @@ def fit_free_fall(
 ) -> PublishedFit:
     """Fit one parameter, and the initial state, to a motion without contact.
 
-    The motion of the rig depends on inertia and stiffness only through M = J/K (thesis,
-    eq. 4.9): select one of them with `where`; the other is fixed.
+    The motion of the rig depends on the inertia J and the stiffness K only through
+    their ratio M = J/K (thesis, eq. 4.9): select one of them with `where`; the other is
+    fixed.
 
     Args:
         system: The system.

@@ -173,7 +173,7 @@ class Trajectory(Printed):
         return jnp.asarray(found[found[:, 1] > found[:, 0]])
 
     def stroboscopic(self, period=None, phase=0.0) -> Float[Array, "k n"]:
-        """Return the states at t0 + phase + k period.
+        """Return the states at the times `t0 + phase + i * period`, i = 0, 1, ...
 
         Args:
             period: Sampling period (s); default: that of the forcing.

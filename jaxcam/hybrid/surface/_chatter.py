@@ -47,7 +47,8 @@ def completion_time(
         damping: Derivative C of the normal acceleration with respect to normal
             velocity.
         restitution: Coefficient of restitution r0 in the limit of slow impacts.
-        softening: Slope r1 of the coefficient, r0 + r1 v.
+        softening: Slope r1 of the coefficient of restitution, r0 + r1 v, where v is the
+            approach speed.
 
     Returns:
         Duration T, in the units of u/A (thesis, eq. 3.17, carried to second order).
@@ -105,10 +106,11 @@ class Completion(NamedTuple):
     time: Float[Array, ""]
     """Accumulation time (s)."""
     state: Float[Array, " n"]
-    """State at that time, shape `(n,)`."""
+    """State at the accumulation time, shape `(n,)`."""
     smallness: Float[Array, ""]
-    """The parameter lambda/(1 - r), which must be small for the completion to be
-    valid.
+    """The parameter lambda/(1 - r), which must be small for the completion to be valid:
+    lambda = u |j| / a^2, with rebound speed u, jerk j, normal acceleration a (for zero
+    normal velocity), and coefficient of restitution r.
     """
 
 
@@ -126,8 +128,8 @@ def chatter_completion(
             map, error O(u^3).
 
     Returns:
-        The accumulation time (s), the state at that time, and lambda/(1 - r), which
-            must be small for both to be valid.
+        The accumulation time (s), the state at that time, and the parameter
+            `smallness`, which must be small for both to be valid.
 
     Raises:
         ValueError: `order` is neither 1 nor 2.

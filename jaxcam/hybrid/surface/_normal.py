@@ -109,7 +109,9 @@ def motion_rates(field: Callable, t, x) -> tuple[State, State, State]:
 
 
 def normal_velocity(system, t, x) -> Float[Array, " m"]:
-    """Return v = H_t + H_x F for each constraint (thesis, eq. 2.26).
+    """Return the normal velocity v = H_t + H_x F of each constraint, where H is the
+    gap, F the vector field, and subscripts denote partial derivatives (thesis, eq.
+    2.26).
 
     Args:
         system: The system.
@@ -131,7 +133,8 @@ def normal_velocity(system, t, x) -> Float[Array, " m"]:
 
 
 def normal_acceleration(system, t, x) -> Float[Array, " m"]:
-    """Return a = dv/dt in free flight for each constraint (thesis, eq. 2.29).
+    """Return the normal acceleration a = dv/dt of each constraint in free flight, where
+    v is the normal velocity (thesis, eq. 2.29).
 
     Args:
         system: The system.
@@ -154,11 +157,11 @@ def normal_acceleration(system, t, x) -> Float[Array, " m"]:
 
 
 def normal_directions(system, t, x) -> Float[Array, "m n"]:
-    """Return the unit direction D of the impulse for each constraint.
+    """Return the direction D of the impulse for each constraint.
 
-    The result is exact if the normal velocity v is zero: an impact changes the state by
-    W v, which vanishes with v, so W follows from the derivative of this change along
-    the gradient of v.
+    D is scaled so that v_x D = 1, where v is the normal velocity and v_x its gradient.
+    An impact changes the state by W v, and W is parallel to D. The direction is found
+    from the derivative of this change along v_x; this is exact where v is zero.
 
     Args:
         system: The system.

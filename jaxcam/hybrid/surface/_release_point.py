@@ -13,8 +13,8 @@ from ._normal import free_jet, gaps, normal_acceleration, normal_velocity
 class ReleasePoint(eqx.Module):
     """The time and state at which contact ends.
 
-    `holds`: 0 for a release, 1 if contact is maintained at `t`, 2 if there is no
-    contact.
+    `holds`: 0 for a release, 1 if contact is maintained at the given time, 2 if there
+    is no contact.
     """
 
     time: Float[Array, ""]
@@ -22,7 +22,9 @@ class ReleasePoint(eqx.Module):
     state: Float[Array, " n"]
     """State at release, shape `(n,)`."""
     holds: Float[Array, ""]
-    """0 for a release, 1 if contact is maintained at `t`, 2 if there is no contact."""
+    """0 for a release, 1 if contact is maintained at the given time, 2 if there is no
+    contact.
+    """
 
 
 def contact_state(system: HybridSystem, times, guess) -> Float[Array, "times n"]:

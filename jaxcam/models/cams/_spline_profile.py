@@ -49,7 +49,7 @@ class SplineProfile(CamProfile):
     need not be evenly spaced. The first point may be repeated one turn later.
     """
     lifts: jax.Array
-    """Contact angles of the follower at these points (rad), shape `(points,)`."""
+    """Contact angles of the follower at `angles` (rad), shape `(points,)`."""
 
     def __init__(self, angles, lifts):
         angles, lifts = as_parameter(angles), as_parameter(lifts)

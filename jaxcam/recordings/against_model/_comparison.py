@@ -64,11 +64,13 @@ class Row:
     worst_record: str
     """Recording with the most significant mean difference over 10 ms."""
     worst_time: float
-    """Midpoint of these 10 ms (s)."""
+    """Midpoint of the 10 ms with the most significant mean difference (s)."""
     worst_phase: float
-    """Cam angle within one turn at this time (rad)."""
+    """Cam angle within one turn at `worst_time` (rad)."""
     worst_score: float
-    """Significance of that difference, in standard errors."""
+    """Magnitude of the mean difference over the 10 ms around `worst_time`, in standard
+    errors.
+    """
 
     def shown(self) -> tuple[str, str, str]:
         """Return the residual and the noise as text, and the unit of both: that of the
