@@ -319,6 +319,17 @@ def test_a_fit_that_is_late_to_beat_another_is_given_up():
     assert not any(given_up(100, _POLICY)(costs[: k + 1]) for k in range(1, 16))
 
 
+@pytest.mark.parametrize("kept", (1e-1, 1e-3))
+def test_a_fit_that_cannot_beat_another_in_time_is_given_up(kept):
+    """From half of the attempts on, if each further one would have to gain a factor of
+    more than ten; a fit that gains more is not stopped.
+    """
+    costs = [1e12 * kept**k for k in range(10)]
+    stop = given_up(100, _POLICY, beaten=100.0)
+    stopped = [stop(costs[: k + 1]) for k in range(10)]
+    assert stopped == [False] * 4 + ([True] * 6 if kept > 1e-2 else [False] * 6)
+
+
 @pytest.mark.usefixtures("unchecked_types")
 def test_a_fit_that_goes_on_to_an_optimum_at_the_same_cost_is_kept(monkeypatch):
     ends = iter([(False, 15), (True, 3)])

@@ -14,12 +14,13 @@ from jaxcam.discrepancy.evidence._held_out import folds_of
 from jaxcam.discrepancy.search import _extended
 from jaxcam.fitting import fit, Model, Parameter, Problem, Sensor
 from jaxcam.fitting.engine import (
+    _linearise,
     cost_by_recording,
     free_columns,
     of_record,
     Weights,
 )
-from jaxcam.fitting.engine._linearise import assemble_one, Costs
+from jaxcam.fitting.engine._linearise import _linearise_all, assemble_one, Costs
 from jaxcam.fitting.engine._predict import smallest_gap
 from jaxcam.fitting.engine._seen_directly import seen_directly
 from jaxcam.recordings import record, segment
@@ -94,6 +95,53 @@ def test_normal_equations_do_not_depend_on_how_they_are_compiled(rooms, found):
         for one, other in zip(ours, theirs):
             size = np.max(np.abs(other), initial=0.0)
             np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * size)
+
+
+def test_a_linearisation_is_kept_for_the_same_point(rooms, found, monkeypatch):
+    """Exactly for the same point, to 1e-12 in other units, and never for others."""
+    columns = free_columns(rooms, rooms.names)
+    local, calls = jnp.asarray(columns.local), []
+
+    def counted(*args):
+        calls.append(args)
+        return _linearise_all(*args)
+
+    monkeypatch.setattr(_linearise, "_linearise_all", counted)
+    _linearise._LATEST.clear()
+
+    def at(point, unit):
+        scales = jnp.asarray(unit * columns.scales)
+        given = rooms.layout, rooms.pieces, rooms.extras, point, local, scales
+        return _linearise.assemble(*given)
+
+    first, costs = at(found.point, 1.0)
+    again, same = at(found.point._replace(states=found.point.states + 0.0), 1.0)
+    assert len(calls) == 1
+    assert all(map(np.array_equal, (*first, *costs), (*again, *same)))
+
+    other, _ = at(found.point, 3.0)
+    assert len(calls) == 1
+    _linearise._LATEST.clear()
+    direct, _ = at(found.point, 3.0)
+    assert len(calls) == 2
+    for one, two in zip(other, direct):
+        size = np.max(np.abs(two))
+        np.testing.assert_allclose(one, two, rtol=0, atol=1e-12 * size)
+
+    values = np.array(found.point.values)
+    values[0, 0] *= 1 + 1e-15
+    at(found.point._replace(values=jnp.asarray(values)), 1.0)
+    assert len(calls) == 3
+
+
+def test_a_fit_with_a_tolerance_ends_as_close_to_the_optimum(rooms, found):
+    """In fewer iterations, at a cost that is higher by less than the tolerance."""
+    start = {"gravity": 9.3, "drag": 0.5}
+    rough = fit(rooms, start=start, tolerance=0.5, stop=lambda costs: False)
+    fine = fit(rooms, start=start, stop=lambda costs: False)
+    assert rough.iterations < fine.iterations
+    assert abs(fine.cost - found.cost) < 1e-3
+    assert -1e-6 < rough.cost - fine.cost < 0.5
 
 
 @pytest.fixture(scope="module")

@@ -110,13 +110,13 @@ def assemble(
     key = kinds(given), id(pieces), *(value.tobytes() for value in values)
     found = _LATEST.find(key)
     if found is None:
-        found = pieces, scales, _assembled(layout, pieces, *about, scales)
+        found = pieces, scales, _linearise_all(layout, pieces, *about, scales)
         _LATEST.keep(key, found)
     _, unit, (blocks, costs) = found
     return _rescaled(blocks, unit, scales), costs
 
 
-def _assembled(layout, pieces, extras, point, columns, scales):
+def _linearise_all(layout, pieces, extras, point, columns, scales):
     shown = shows_directly(layout, pieces, columns, scales)
     every = pieces, extras, point.states, columns, scales
 
