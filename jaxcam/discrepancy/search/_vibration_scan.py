@@ -182,21 +182,23 @@ def _gain(inside, score, parts) -> Float[np.ndarray, " w"]:
     """Return the gain of a cosine and a sine for each part, with the parameters
     eliminated.
     """
-    across, scores, own = [], [], []
+    across, scores, blocks = [], [], []
     for pf, f, ff, fc in parts:
         across += [pf.real, pf.imag]
         scores += [f.real, f.imag]
         cc, ss, cs = (fc + ff.real) / 2, (fc - ff.real) / 2, ff.imag / 2
-        own.append(np.array([[cc, cs], [cs, ss]]))
+        blocks.append(np.array([[cc, cs], [cs, ss]]))
     c = np.moveaxis(np.array(across), -1, 0)
     width = c.shape[1]
     taken = c @ inside
     left = np.array(scores).T - taken @ score
     matrix = -taken @ np.swapaxes(c, 1, 2)
-    for k, block in enumerate(own):
+    for k, block in enumerate(blocks):
         pick = slice(2 * k, 2 * k + 2)
         matrix[:, pick, pick] += np.moveaxis(block, -1, 0)
-    scale = 1 / np.sqrt(np.maximum(np.einsum("wii->wi", matrix), TINY))
+    own = np.einsum("wii->wi", matrix)
+    # a force that the parameters represent to within rounding gains nothing
+    scale = np.where(own > 0, 1 / np.sqrt(np.maximum(own, TINY)), 0.0)
     matrix = matrix * scale[:, :, None] * scale[:, None, :]
     left = left * scale
     solved = np.linalg.solve(matrix + _SHAKEN * np.eye(width), left[..., None])[..., 0]
