@@ -58,8 +58,8 @@ def event_causes(
     """Rank terms by how well they explain the speeds at which the type of motion
     changes.
 
-    Each term is tried alone. Four speeds hardly distinguish between terms: those whose
-    misfit is within a few units of the smallest are equally good.
+    Each term is tried alone. Four speeds hardly distinguish between terms: terms
+    whose misfit is within a few units of the smallest are equally good.
 
     Args:
         rig: The rig.

@@ -64,7 +64,7 @@ class Policy:
     )
     corner_share: float = decides(
         3e-4,
-        "largest cost, as a fraction of the explained cost, attributed to smoothing "
+        "largest fraction of the explained cost that is attributed to the smoothing of "
         "dry friction; a term that explains less is not named together with friction",
     )
     separate_gain: float = decides(

@@ -53,7 +53,7 @@ def segment_by_model(
     """Segment recordings at every gap of a model's system.
 
     A gap is computed from the measured components of the state and shifted so that it
-    is zero where its velocity jumps, as far as the tolerances of the parameters allow.
+    is zero where its rate jumps, as far as the tolerances of the parameters allow.
     If channels that do not saturate also measure the velocities that the rate of change
     of a gap depends on, impacts are jumps of this rate, and contacts are stretches in
     which it is zero. If the system has no gap, each recording is one flight.

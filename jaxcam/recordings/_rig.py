@@ -97,8 +97,9 @@ class References:
     stribeck_speed: float = 0.1
     """Stribeck speed (rad/s), below which friction is larger."""
     slip_speed: float = 0.015
-    """Speed (rad/s) over which dry friction changes sign, far below the speeds of the
-    motion; for friction that varies with position, `free_slip_speed` is used instead.
+    """Width (rad/s) of the `tanh` that smooths dry friction at zero velocity, far below
+    the speeds of the motion; for friction that varies with position, `free_slip_speed`
+    is used instead.
     """
     free_slip_speed: float = 0.01
     """Slip speed (rad/s) of friction that varies with position."""

@@ -144,7 +144,7 @@ class Diagnosis:
     left_after: tuple[Structure, ...]
     """Structures searched for in the residuals of the chosen model."""
     unseen: tuple[list[Residuals], list[Residuals]]
-    """Held-out residuals of both models."""
+    """Held-out residuals of the textbook model and of the chosen model."""
     ripple: Ripple | None
     """Speed ripple of the drive."""
     pulls: dict[str, tuple[float, float]]

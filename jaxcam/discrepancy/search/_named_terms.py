@@ -26,8 +26,8 @@ def with_terms(
         terms: Names from `library(extended=True)`, or terms of your own that act on the
             first coordinate. Their strengths are initially zero.
         recordings: Recordings from which the terms take their scales: the range of the
-            positions, typical speeds and accelerations, and the speed over which dry
-            friction changes sign.
+            positions, typical speeds and accelerations, and the width (a speed) of the
+            `tanh` that smooths dry friction at zero velocity.
 
     Returns:
         The model with the terms in its system, and all parameters.

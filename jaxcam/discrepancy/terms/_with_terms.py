@@ -47,8 +47,9 @@ class WithTerms(Wrapping):
 
         Args:
             field: Rate of change of the state, if known.
-            moving: Rate of change of the state on other sides of switching surfaces,
-                which has the same velocities; default: `field`.
+            moving: Rate of change of the state from which the velocity is taken; it may
+                be evaluated on other sides of the switching surfaces than `field`,
+                because the velocities are the same there. Default: `field`.
         """
         place, rate = self.coordinates[coordinate]
         moving = field if moving is None else moving
