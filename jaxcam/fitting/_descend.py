@@ -71,13 +71,16 @@ class Objective:
         known = prior_cost(self.problem, self.columns, point, self.prior)
         return Linear(point, blocks, costs, total_cost(costs, self.extras) + known)
 
-    def step(self, at: Linear, damping: float) -> tuple[Point, float]:
-        """Return the end of a damped step, and the predicted decrease of the cost."""
-        return damped_step(
-            self.problem, self.columns, at.blocks, at.point, damping, self.prior
-        )
+    def step(
+        self, at: Linear, damping: float, states: float = 0.0
+    ) -> tuple[Point, float]:
+        """Return the end of a step with damped parameters and states, and the predicted
+        decrease of the cost.
+        """
+        given = self.problem, self.columns, at.blocks, at.point, damping
+        return damped_step(*given, self.prior, states)
 
-    def corrected(self, start: Linear, end: Point, damping: float) -> Linear:
+    def corrected(self, start: Linear, end: Point, damping: Damping) -> Linear:
         """Return the end of a step from `start`, after corrections.
 
         In a curved, steep valley, a long step ends on the slope: it is assessed after
@@ -89,7 +92,8 @@ class Objective:
             if found.cost <= start.cost or not above < _LEADS_BACK * excess:
                 break
             excess = above
-            found = self.at(self.step(found, damping)[0])
+            end, _ = self.step(found, damping.value, damping.states)
+            found = self.at(end)
         return found
 
 
@@ -108,17 +112,18 @@ def descend(
     best, damping = objective.at(point), Damping()
     so_far, optimal, count = [best.cost], False, 0
     for count in range(1, iterations + 1):
-        end, promise = objective.step(best, damping.value)
+        end, promise = objective.step(best, damping.value, damping.states)
         known = bool(np.isfinite(promise))
         if known and promise < tolerance:
             # in a valley, a damped step always predicts little gain; the undamped step
             # must predict little gain as well
             _, whole = objective.step(best, LEAST_DAMPING)
-            if not whole > _UNDAMPED * tolerance or damping.value <= LEAST_DAMPING:
+            least = damping.value <= LEAST_DAMPING and not damping.states
+            if not whole > _UNDAMPED * tolerance or least:
                 optimal, message = True, "The optimum was reached."
                 break
             damping = damping.in_a_valley()
-        found = objective.corrected(best, end, damping.value) if known else None
+        found = objective.corrected(best, end, damping) if known else None
         if found is not None and np.isfinite(found.cost) and found.cost <= best.cost:
             gained = (best.cost - found.cost) / max(promise, 1e-300)
             best, damping = found, damping.accepted(gained)

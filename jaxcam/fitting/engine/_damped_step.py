@@ -4,15 +4,18 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._columns import gathered, off_nominal, prior_information
-from ._eliminate import eliminate_states, state_steps
+from ._eliminate import eliminate_states, LEAST, state_steps
 from ._linearise import Blocks, Point
 
 
-def damped_step(problem, columns, blocks, point, damping, prior):
+def damped_step(problem, columns, blocks, point, damping, prior, states=0.0):
     """Return one damped step within the bounds, and the predicted decrease of the
     cost.
+
+    **Arguments:** `damping` of the parameters, relative to their scales, and of the
+    `states`, as a fraction of their own information.
     """
-    found = eliminate_states(blocks)
+    found = eliminate_states(blocks, jnp.asarray(LEAST + states))
     size = len(columns.scale)
     information, score = gathered(columns, found)
     strength = prior_information(problem, columns, prior)
@@ -21,14 +24,14 @@ def damped_step(problem, columns, blocks, point, damping, prior):
         score = score - strength * off_nominal(problem, columns, point)
     change = _bounded(problem, columns, point, information, score, damping)
     filled = np.append(change, 0.0)[columns.place]
-    states = state_steps(found, jnp.asarray(filled))
+    steps = state_steps(found, jnp.asarray(filled))
     values = np.array(point.values)
     for r, (place, local) in enumerate(zip(columns.place, columns.local)):
         used = place >= 0
         values[r, local[used]] += change[place[used]] * columns.scale[place[used]]
     # the decrease that the quadratic model of the cost predicts for the full step
     gain = float(change @ score) + _state_gain(blocks, found)
-    moved = Point(jnp.asarray(values), point.states + states)
+    moved = Point(jnp.asarray(values), point.states + steps)
     return moved, gain
 
 
