@@ -48,7 +48,7 @@ def residual_by_mode(
         The figure.
 
     Raises:
-        ValueError: There is nothing to draw, there is no cam for the phase, or
+        ValueError: There is nothing to draw, the system has no cam, so there is no phase, or
             `against` is unknown.
 
     Examples:
