@@ -44,13 +44,13 @@ def branch(
         algorithm: The algorithm; default: [`continuation.PseudoArclength`][].
         settings: Accuracy and step control.
         direction: 1 or -1; or `"both"`, in which case the parts towards smaller and
-            larger parameters are joined in order and relabelled.
+            larger parameter values are joined in order and relabelled.
         callbacks: Called with each point as it is found, for example to save it. If a
             callback returns True, the branch ends.
         progress: Called after each point with the fraction of `settings.max_points`
             computed, and with 1 at the end. Most branches end earlier, at a bound.
         out: A file to which each point is appended, for [`continuation.load_branch`][];
-            for `"both"`, the part towards smaller parameters has its own `.back` file.
+            for `"both"`, the part towards smaller values has its own `.back` file.
         resume: Whether to continue an interrupted call from the points in `out`. The
             result is identical to that of an uninterrupted call.
 

@@ -65,7 +65,7 @@ class AbstractStepControl(eqx.Module):
 
 
 class EffortAndAngle(AbstractStepControl):
-    """Adapt the step length to the corrector iterations and the curvature of the
+    """Adapt the step to the number of corrector iterations and the curvature of the
     branch.
 
     See the thesis, section 3.4.4.

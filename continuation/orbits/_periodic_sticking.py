@@ -55,10 +55,10 @@ class StickingOrbits(AbstractProblem):
     where the orbit exists:
 
     - the margin of [`variational.chatter_accumulation`][], which is zero if the impacts
-        accumulate exactly at the n-th release. The sticking time itself is unsuitable
-        as a test function: it falls to zero as a power of the distance from this
-        interruption and does not change sign (thesis, section 3.5.1). The margin is
-        smooth.
+        accumulate exactly at the n-th release (an interruption of chatter). The
+        sticking time itself is unsuitable as a test function: it falls to zero as a
+        power of the distance from this interruption and does not change sign
+        (thesis, section 3.5.1). The margin is smooth.
     - the rate of change of the contact acceleration at release, with time measured in
         forcing periods. It is zero at the detachment point (valve float), where release
         and the next return to contact coincide; beyond that point, contact never ends.

@@ -92,7 +92,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     impact occurs there.
     """
     passed: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
-    """Number of grazings of constraints that the branch has passed."""
+    """Number of grazing bifurcations that the branch has passed through."""
 
     @staticmethod
     def of(
@@ -288,11 +288,11 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
 
     @property
     def may_touch(self) -> bool:
-        """Whether `touching` may find a grazing: with switching surfaces and gaps."""
+        """Whether `touching` may find a grazing: true with surfaces and gaps."""
         return isinstance(self.parameters, SwitchedSystem)
 
     def touching(self, context, at, reach: float) -> Touch | None:
-        """Return the grazing of a constraint within `reach` ahead of an orbit, or None.
+        """Return the grazing ahead of an orbit on its branch, within `reach`, or None.
 
         Args:
             context: Constants of the branch.

@@ -25,7 +25,7 @@ def new_rig(
     ],
 ) -> None:
     """
-    Write an example for a rig of your own: a Python file and a rig file to edit.
+    Write a template for a rig of your own: a Python file and a rig file to edit.
 
     \b
     Examples:

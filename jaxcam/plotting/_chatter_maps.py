@@ -70,14 +70,14 @@ def _cobweb(lam, r, most=40):
 def beta_lobes(
     r: float, ax: Axes | None = None, *, measured=None, lobes: int = 4
 ) -> Figure:
-    """Draw beta against lambda - lambda_bar, with its corners (thesis, Figures 6.14 and
+    """Plot beta against lambda - lambda_bar, with its corners (thesis, Figures 6.14 and
     6.15).
 
     Args:
         r: Coefficient of restitution.
         ax: Axes to draw on; default: a new figure.
-        measured: Deviations of lambda and values of beta from simulations, drawn behind
-            the theoretical curve.
+        measured: Simulated values of lambda - lambda_bar and of beta, drawn behind the
+            theoretical curve.
         lobes: Number of lobes, starting with the largest.
 
     Returns:
@@ -112,7 +112,7 @@ def beta_lobes(
 
 @styled
 def lobe_scaling(distance, height, kappa: float, ax: Axes | None = None) -> Figure:
-    """Draw the heights of lobes against their distance from the interruption (thesis,
+    """Plot the heights of lobes against their distance from the interruption (thesis,
     eq. 6.53).
 
     Args:

@@ -48,8 +48,8 @@ def residual_by_mode(
         The figure.
 
     Raises:
-        ValueError: There is nothing to draw, there is no cam for the phase, or
-            `against` is unknown.
+        ValueError: There is nothing to draw, the system has no cam and so no phase,
+            or `against` is unknown.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

@@ -23,7 +23,7 @@ def time_history(
     between: tuple[float, float] | None = None,
     samples: int = 1500,
 ) -> Figure:
-    """Draw each component of the state, and the gap, against time.
+    """Plot each component of the state, and the gap, against time.
 
     Impacts are shown as dots on the curves, jumps as thin dashed lines, and contacts as
     shaded intervals.

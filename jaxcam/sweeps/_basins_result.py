@@ -68,7 +68,7 @@ class Basins:
 
     @property
     def scale(self) -> np.ndarray:
-        """Scale of the motions, by which differences of orbits are divided, shape
+        """Scale of the motions, by which differences between orbits are divided, shape
         `(n,)`.
         """
         return np.array(json.loads(self.dataset.attrs[SWEEP])["scale"])
