@@ -71,9 +71,10 @@ def moreau(
     constraint violated, the velocities jump at mid-step according to a complementarity
     condition: each normal velocity at the end is at least the value given by the
     impact law, never negative, and larger only if no impulse acts (after J. J.
-    Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988). Impacts, simultaneous impacts,
-    chatter and sticking all follow from this rule without tuning. The error and the
-    penetration of constraints are of first order in the step length.
+    Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988).
+    Impacts, simultaneous impacts, chatter and sticking all follow from this rule
+    without tuning. The error and the penetration of constraints are of first order in
+    the step length.
 
     Args:
         system: The system.
