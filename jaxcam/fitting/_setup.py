@@ -12,6 +12,7 @@ import numpy as np
 
 from ..recordings import read_case, Recording, RecordingError, Segments
 from ..recordings.files import Case, FileLayout
+from ._contact_in_doubt import contact_in_doubt
 from ._lags import without_lags
 from ._segment_by_model import segment_by_model
 from .engine import Input, Model, Parameter, Problem
@@ -147,6 +148,13 @@ class Setup:
             )
         )
         return tuple(run if isinstance(run, Segments) else next(cut) for run in runs)
+
+    def contact_in_doubt(self, segments: Iterable[Segments]) -> str:
+        """Return a sentence if no recording shows an impact although the system has
+        stops, or if a recording lies far beyond a stop: the unit of a column may be
+        wrong. The sentence is empty if there is no such doubt.
+        """
+        return contact_in_doubt(self.model, self.parameters, tuple(segments))
 
     def _refuse_still(self, run: Recording) -> None:
         """Raise `RecordingError` for a sensor of the motion that shows no motion."""
