@@ -43,6 +43,16 @@ def test_a_motion_that_spirals_in_is_not_of_a_multiple_period(multiplier):
     assert np.all(found[size < 1e-7] == 1) and np.all(found[size > 1e-4] == 0)
 
 
+@pytest.mark.parametrize(
+    ("spread", "period"), [(1e-7, 2), (3e-6, 2), (2e-5, 4), (0.1, 4)]
+)
+def test_an_alternation_by_about_the_tolerance_is_no_longer_period(spread, period):
+    """A cycle of four points that is almost one of two; the tolerance is 1e-6."""
+    cycle = np.array([1.0, -1.0, 1.0 + spread, -1.0])
+    lanes = np.tile(cycle, 8)[None, :, None]
+    assert periods(lanes, 1e-6, np.ones((1, 1))).tolist() == [period]
+
+
 def test_labels_of_an_oscillator(settled):
     assert label_names(label(settled)).tolist() == ["P(1,1)", "P(6,6)"]
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..hybrid import HybridSystem
 from ..models import CamFollower, ConstantRestitution
+from ._corner_warning import warn_of_corners
 from ._source import make_system, Source
 
 
@@ -29,10 +30,15 @@ def make_model(
 ) -> HybridSystem:
     """Create a system with the parameters given on the command line.
 
+    A warning is printed if a user's system is not smooth.
+
     Raises:
         ValueError: A name or value is invalid; the message says how to fix it.
     """
-    return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
+    system = make_system(name, preset, rpm, source)
+    if source:
+        warn_of_corners(system)
+    return assign_parameters(system, assignments or ())
 
 
 def parameters(system: HybridSystem) -> dict[str, float]:
