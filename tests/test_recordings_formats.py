@@ -176,7 +176,16 @@ def test_rows_that_lack_a_channel_are_left_out_and_said(tmp_path):
     (run,) = read_recordings(written(tmp_path, text), columns={"a_m": "height_m"})
     np.testing.assert_array_equal(run["height_m"], [1, 2, 3])
     (note,) = run.meta["notes"]
-    assert "2 rows with an empty cell, the first of them row 1," in note
+    assert "2 rows, the first of them row 1 (counted without the heading)," in note
+
+
+def test_a_single_row_without_a_number_is_said_in_the_singular(tmp_path):
+    text = "time_s,a_m\n0,1\n0.1,2\n0.2,NaN\n0.3,4\n0.4,5\n"
+    columns = {"a_m": "height_m"}
+    (run,) = read_recordings(written(tmp_path, text), columns=columns, gaps="mend")
+    rows, samples = run.meta["notes"]
+    assert "row 3 (counted without the heading) has no number" in rows
+    assert "1 sample (20 %) is missing" in samples
 
 
 def test_qualisys(tmp_path):

@@ -10,6 +10,7 @@ import equinox as eqx
 from .. import fitting
 from ..discrepancy import Policy
 from ..recordings import Recording, Rig, segment_case, Segments
+from ..tables import counted
 from ._fit_report import correlation_table, nominal_value, parameter_table
 from ._impact_laws import impact_laws
 from ._output import Output
@@ -61,8 +62,8 @@ class Result:
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         sentence = (
             f"The rms residual of {self.problem.samples} samples of "
-            f"{len(self.problem.records)} recordings is {ratio:.3f} times the sensor "
-            "noise."
+            f"{counted(len(self.problem.records), 'recording')} is {ratio:.3f} times "
+            "the sensor noise."
         )
         if ratio > Policy().as_noise and len(self.problem.records) > 1:
             sentence += (
