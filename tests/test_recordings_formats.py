@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from jaxcam.recordings import read_case, read_recording, RecordingError
-from jaxcam.recordings.files import read_recordings
+from jaxcam.recordings import read_case, read_recording, Recording, RecordingError
+from jaxcam.recordings.files import mend, read_recordings
 
 
 TIME = np.arange(6) * 0.01
@@ -180,12 +180,14 @@ def test_rows_that_lack_a_channel_are_left_out_and_said(tmp_path):
 
 
 def test_a_single_row_without_a_number_is_said_in_the_singular(tmp_path):
-    text = "time_s,a_m\n0,1\n0.1,2\n0.2,NaN\n0.3,4\n0.4,5\n"
+    rows = [f"{k / 1000},{k if k != 12 else 'NaN'}" for k in range(60)]
+    text = "\n".join(["time_s,a_m", *rows, ""])
     columns = {"a_m": "height_m"}
     (run,) = read_recordings(written(tmp_path, text), columns=columns, gaps="mend")
-    rows, samples = run.meta["notes"]
-    assert "row 3 (counted without the heading) has no number" in rows
-    assert "1 sample (20 %) is missing" in samples
+    notes = " ".join(run.meta["notes"])
+    assert "row 13 (counted without the heading) has no number" in notes
+    (note,) = mend(Recording("run", np.delete(np.arange(60) / 1e3, 12), {})).notes
+    assert "1 sample (1.7 %) is missing" in note
 
 
 def test_qualisys(tmp_path):
