@@ -333,7 +333,7 @@ def test_from_recordings_to_a_fitted_system(rig):
     )
     assert "The optimum was reached." in said
     # laws from the impacts on either stop
-    assert "left stop: ConstantRestitution" in said and "right stop:" in said
+    assert "left stop: Constant restitution" in said and "right stop:" in said
     assert (rig / "fit" / "residuals_time.png").exists()
     assert said.count("Rough estimates of the restitution from single impacts") == 1
     # there is no drive to draw them by

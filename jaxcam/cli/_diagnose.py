@@ -27,8 +27,7 @@ def diagnose(
     predict: Annotated[
         bool,
         typer.Option(
-            help="For a cam-follower, predict bifurcation speeds with and without the "
-            "missing physics."
+            help="Predict the bifurcation speeds of a cam-follower with the effects."
         ),
     ] = True,
     propose: Annotated[

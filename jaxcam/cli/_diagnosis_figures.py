@@ -63,8 +63,8 @@ _UNSEEN = (
     "effects (bottom). The band is +-2 standard deviations of the noise."
 )
 _UNSEEN_ALONE = (
-    "Residuals of held-out sections of one recording, predicted one flight ahead by the "
-    "textbook model after a fit to the other sections. The band is +-2 standard "
+    "Residuals of held-out sections of one recording, predicted one flight ahead by "
+    "the textbook model after a fit to the other sections. The band is +-2 standard "
     "deviations of the noise."
 )
 _MAPS = (
