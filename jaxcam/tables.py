@@ -72,3 +72,21 @@ def scaled(unit: str, largest: float) -> tuple[float, str]:
     if not np.isfinite(largest) or largest > 2e-5:
         return 1e3, f"m{unit}"
     return 1e6, f"µ{unit}"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number and a noun, in the plural unless the number is one.
+
+    Args:
+        number: The number.
+        noun: The noun in the singular, with a regular plural.
+
+    Returns:
+        The phrase.
+
+    Examples:
+        >>> from jaxcam.tables import counted
+        >>> counted(1, "recording"), counted(2, "recording")
+        ('1 recording', '2 recordings')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -17,6 +17,7 @@ from jaxcam.cli._axis import Axis
 from jaxcam.cli._output import Output
 from jaxcam.cli._source import Source
 from jaxcam.data import DEMO_RIG
+from jaxcam.fitting._doubts import Doubt, Reason
 from jaxcam.fitting._fit_result import Estimate
 
 
@@ -114,16 +115,19 @@ def test_the_reason_of_a_failed_fit_is_left_to_standard_error(
         after=after,
         again=None,
         seen=SimpleNamespace(sentences=lambda: []),
+        doubted="The unit is in doubt.",
         laws={},
         remainder="Remainder.",
         outside=[],
         sentence="Reason. Remainder.",
     )
     _fit_result.print_fit(Output(None, None), found, ())  # pyright: ignore
-    assert capsys.readouterr().out.count("Reason.") == converged
+    said = capsys.readouterr().out
+    assert said.count("Reason.") == converged
+    assert said.startswith("The unit is in doubt.")
 
 
-def _ended(gravity: float, ratio: float):
+def _ended(gravity: float, ratio: float, reasons=()):
     """A fit with one parameter (9.81 +- 0.02) and one channel."""
     parameter = SimpleNamespace(tolerance=0.02, nominal=9.81)
     problem = SimpleNamespace(
@@ -133,7 +137,7 @@ def _ended(gravity: float, ratio: float):
         model=SimpleNamespace(drive=None),
     )
     estimate = Estimate("gravity", gravity, 0.001, "m/s^2")
-    after = SimpleNamespace(estimates=[estimate])
+    after = SimpleNamespace(estimates=[estimate], reasons=reasons)
     found = _fit_result.Result(problem, (), None, after, None, {}, None)  # pyright: ignore
     return found, {"record": "a", "channel": "x", "rms": ratio, "ratio": ratio}
 
@@ -149,9 +153,24 @@ def test_a_value_outside_its_tolerance_is_said(gravity, count):
         assert "outside its tolerance (9.79 to 9.83 m/s^2)" in sentence
 
 
-@pytest.mark.parametrize(("ratio", "said"), [(999.0, False), (1001.0, True)])
-def test_a_hopeless_fit_doubts_the_units(ratio, said, monkeypatch):
-    found, quality = _ended(9.81, ratio)
+AT_BOUND = (Reason(Doubt.ON_A_BOUND, "It is at its lower bound."),)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "ratio", "reasons", "said"),
+    [
+        (9.81, 999.0, (), False),
+        (9.81, 1001.0, (), True),
+        # ten tolerances of 0.02
+        (9.81 + 0.199, 1.0, (), False),
+        (9.81 - 0.201, 1.0, (), True),
+        # a bound is suspicious only in a poor fit
+        (9.81, 1.0, AT_BOUND, False),
+        (9.81, 5.0, AT_BOUND, True),
+    ],
+)
+def test_a_hopeless_fit_doubts_the_units(gravity, ratio, reasons, said, monkeypatch):
+    found, quality = _ended(gravity, ratio, reasons)
     monkeypatch.setattr(_fit_result.Result, "quality", [quality])
     assert ("deg or rad, ms or s" in found.remainder) == said
 
@@ -314,7 +333,7 @@ def test_from_recordings_to_a_fitted_system(rig):
     )
     assert "The optimum was reached." in said
     # laws from the impacts on either stop
-    assert "left stop: ConstantRestitution" in said and "right stop:" in said
+    assert "left stop: Constant restitution" in said and "right stop:" in said
     assert (rig / "fit" / "residuals_time.png").exists()
     assert said.count("Rough estimates of the restitution from single impacts") == 1
     # there is no drive to draw them by

@@ -77,5 +77,35 @@ def test_what_does_not_depend_on_the_motion_is_no_corner():
     assert corners(BilinearOscillator(), [0.0, 0.0]) == []
 
 
+@pytest.mark.parametrize(
+    ("force", "count"),
+    [
+        (lambda self, v: 0.3 * v * jnp.abs(v), 0),
+        (lambda self, v: self.gravity * jnp.abs(v) * v, 0),
+        (lambda self, v: jnp.abs(v) * v + jnp.abs(v), 1),
+        (lambda self, v: jnp.abs(v) * self.gravity, 1),
+        (lambda self, v: jnp.abs(v) ** 2, 1),
+    ],
+)
+def test_quadratic_drag_is_no_corner(force, count):
+    class Drag(Ball):
+        def force(self, t, state):
+            return force(self, state[1])
+
+    assert len(corners(Drag(), [1.0, 0.0])) == count
+
+
+def test_a_switch_at_a_declared_time_is_no_corner():
+    class Pulse(Ball):
+        def force(self, t, state):
+            return jnp.where(t < 0.5, 1.0, 0.0) + jnp.maximum(state[0], 0.1)
+
+        @property
+        def breakpoints(self):
+            return jnp.array([0.5])
+
+    assert [c.operation for c in corners(Pulse(), [1.0, 0.0])] == ["maximum"]
+
+
 def test_a_corner_of_unknown_origin_names_no_line():
     assert str(jaxcam.hybrid.Corner("gap", "abs", "", 0)).startswith("`abs` in `gap`")

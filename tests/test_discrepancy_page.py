@@ -11,6 +11,7 @@ from PIL import Image
 from jaxcam.cli import write_report
 from jaxcam.cli._diagnosis_figures import _maps, _unseen, draw
 from jaxcam.cli._diagnosis_page import _knockoffs, diagnosis_page
+from jaxcam.cli._outlook import Outlook
 from jaxcam.cli._output import to_text
 from jaxcam.cli._page import prose
 from jaxcam.cli._ranking_figure import ranking, two_lines
@@ -69,7 +70,7 @@ def _diagnosis(verdict, effects):
         heldout_after=1e-4,
         noise_floor=1e-4,
         unit="rad",
-        rig={"K/J": Value(2400.0, 20.0, "1/(m^2 s^2)")},
+        rig={"K/J": Value(2401.04, 0.21, "1/(m^2 s^2)")},
         summary="The model lacks damping. Without it <nothing> fits.",
         before=None,  # pyright: ignore
         after=None,  # pyright: ignore
@@ -77,7 +78,7 @@ def _diagnosis(verdict, effects):
         left_after=(shape,),
         unseen=(parts, parts),
         ripple=None,
-        pulls={"stiffness": (1.3, 0.2)},
+        pulls={"K/J": (1.3, 0.2)},
         limits={"fc": Value(0.01, 0.003, "rad/s^2")},
         hides={"fc": "restitution"},
         caveats=(Caveat(Reason.TIE, "One caveat."),),
@@ -143,6 +144,16 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
             inches = image.width / image.info["dpi"][0]
         assert f'<img width="{96 * inches:.0f}"' in page
     assert '"verdict"' in to_text(found.to_json())
+    # the value of a parameter has all its digits and a unit
+    assert "<td>2401 ± 0.2 1/(m<sup>2</sup> s<sup>2</sup>)</td>" in page, page
+    assert ("per unit mass" in page) == bool(effects)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_the_page_says_why_nothing_is_predicted(tmp_path):
+    found = _diagnosis("none", ())
+    outlook = Outlook(reason="Speeds are predicted only for a cam-follower.")
+    assert "only for a cam-follower" in diagnosis_page(found, (), (), outlook)
 
 
 @pytest.mark.usefixtures("unchecked_types")

@@ -244,8 +244,17 @@ def test_a_hopeless_model_doubts_the_units(after, single, said):
     """Beyond 1000 times the noise, on held-out data or on single pieces."""
     errors = [] if single is None else [SimpleNamespace(residual=single, stated=1.0)]
     caveats = units_in_doubt(
-        SimpleNamespace(model_errors=errors),  # pyright: ignore
+        SimpleNamespace(model_errors=errors, doubted=""),  # pyright: ignore
         SimpleNamespace(held=SimpleNamespace(after=after)),  # pyright: ignore
         Policy(),
     )
     assert [caveat.reason for caveat in caveats] == [Reason.UNITS] * said
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_positions_that_contradict_the_stops_are_a_caveat():
+    question = SimpleNamespace(doubted="No impact was found.", model_errors=())
+    choice = SimpleNamespace(held=SimpleNamespace(after=1.0))
+    (caveat,) = units_in_doubt(question, choice, Policy())  # pyright: ignore
+    assert caveat.reason is Reason.UNITS
+    assert caveat.sentence == "No impact was found."

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from jaxcam.recordings import read_case, read_recording, RecordingError
-from jaxcam.recordings.files import read_recordings
+from jaxcam.recordings import read_case, read_recording, Recording, RecordingError
+from jaxcam.recordings.files import mend, read_recordings
 
 
 TIME = np.arange(6) * 0.01
@@ -176,7 +176,18 @@ def test_rows_that_lack_a_channel_are_left_out_and_said(tmp_path):
     (run,) = read_recordings(written(tmp_path, text), columns={"a_m": "height_m"})
     np.testing.assert_array_equal(run["height_m"], [1, 2, 3])
     (note,) = run.meta["notes"]
-    assert "2 rows with an empty cell, the first of them row 1," in note
+    assert "2 rows, the first of them row 1 (counted without the heading)," in note
+
+
+def test_a_single_row_without_a_number_is_said_in_the_singular(tmp_path):
+    rows = [f"{k / 1000},{k if k != 12 else 'NaN'}" for k in range(60)]
+    text = "\n".join(["time_s,a_m", *rows, ""])
+    columns = {"a_m": "height_m"}
+    (run,) = read_recordings(written(tmp_path, text), columns=columns, gaps="mend")
+    notes = " ".join(run.meta["notes"])
+    assert "row 13 (counted without the heading) has no number" in notes
+    (note,) = mend(Recording("run", np.delete(np.arange(60) / 1e3, 12), {})).notes
+    assert "1 sample (1.7 %) is missing" in note
 
 
 def test_qualisys(tmp_path):

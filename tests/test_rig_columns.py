@@ -72,6 +72,16 @@ def test_constants_of_a_record_that_is_not_there(tmp_path):
     hostile_files.said(caught.value)
 
 
+def test_constants_of_other_records_are_noted_if_one_was_picked(tmp_path):
+    setup = setup_of(tmp_path)
+    case = setup.read_case(case_of(tmp_path, "drop1", "drop2"))
+    one = dataclasses.replace(case, recordings=case.recordings[:1])
+    found = setup.known_of(one, picked=True)
+    assert found[0].constants == {"gravity": 9.83}
+    (note,) = found[0].meta["notes"]
+    assert 'records."drop2"' in note and "not used" in note
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

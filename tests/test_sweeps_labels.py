@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import jaxcam
+from jaxcam import sweeps
 from jaxcam.models import ImpactOscillator
 from jaxcam.parameters import pick
 from jaxcam.sweeps import PoincareSection, return_times, Stroboscopic
-from jaxcam.sweeps.attractors import label, periods
+from jaxcam.sweeps.attractors import drifting, label, periods
 from jaxcam.sweeps.attractors._label import label_names
 from jaxcam.sweeps.attractors._unique_rows import unique_rows
 
@@ -41,6 +42,43 @@ def test_a_motion_that_spirals_in_is_not_of_a_multiple_period(multiplier):
     assert set(found) == {0, 1}
     size = np.abs(multiplier) ** np.arange(40) * np.abs(multiplier - 1)
     assert np.all(found[size < 1e-7] == 1) and np.all(found[size > 1e-4] == 0)
+
+
+@pytest.mark.parametrize(
+    ("spread", "period"), [(1e-7, 2), (3e-6, 2), (2e-5, 4), (0.1, 4)]
+)
+def test_an_alternation_by_about_the_tolerance_is_no_longer_period(spread, period):
+    """A cycle of four points that is almost one of two; the tolerance is 1e-6."""
+    cycle = np.array([1.0, -1.0, 1.0 + spread, -1.0])
+    lanes = np.tile(cycle, 8)[None, :, None]
+    assert periods(lanes, 1e-6, np.ones((1, 1))).tolist() == [period]
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "period"), [(0.95, 1), (-0.97, 1), (0.9 + 0.3j, 1), (0.97, 3)]
+)
+def test_a_slow_transient_is_told_from_a_motion_without_a_period(multiplier, period):
+    """Powers of a multiplier inside the unit circle, beside a cycle, start within a
+    hundredth of it; a rotation and the chaotic logistic map do not settle."""
+    k = np.arange(60)
+    slow = 0.01 * np.real(np.asarray(multiplier) ** k) + np.cos(2 * np.pi * k / period)
+    turning = np.cos(2.0 * k)
+    chaotic = np.empty((20, 60))
+    chaotic[:, 0] = np.linspace(0.1, 0.4, 20)
+    for step in range(59):
+        chaotic[:, step + 1] = 3.9 * chaotic[:, step] * (1 - chaotic[:, step])
+    lanes = np.concatenate([slow[None], turning[None], chaotic])[..., None]
+    found = drifting(lanes)
+    assert found[0] and not np.any(found[1:])
+    assert periods(lanes[:1]) == 0
+
+
+def test_a_diagram_says_what_has_not_settled():
+    """Near the flip of the logistic map at 3, 60 iterations do not suffice."""
+    logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+    found = sweeps.diagram(logistic, "mu", [2.7, 2.99, 3.9], [0.3], turns=100, keep=40)
+    assert found.labels[:, 0].tolist() == ["period 1", "not settled", "aperiodic"]
+    assert [one.label for one in found.ranges()] == found.labels[:, 0].tolist()
 
 
 def test_labels_of_an_oscillator(settled):

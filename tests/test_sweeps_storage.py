@@ -17,7 +17,11 @@ import pytest
 import zarr
 from sweep_maps import LOGISTIC, SQUARE_ROOT
 
-from jaxcam.sweeps import basins, diagram, Grid, load_sweep, Map
+from jaxcam.fitting.own_systems import system_class
+from jaxcam.models import ImpactOscillator
+from jaxcam.sweeps import basins, diagram, Grid, load_sweep, Map, Stroboscopic
+from jaxcam.sweeps._inputs import as_section
+from jaxcam.sweeps.blocks import about_section
 from jaxcam.sweeps.blocks._disk import OnDisk
 
 
@@ -294,3 +298,76 @@ def test_a_chain_of_values_is_resumed_where_it_stopped(tmp_path):
     assert found.direction.tolist() == [1] * 21 + [-1] * 21
     assert np.array_equal(found.values[:21], values)
     assert np.array_equal(found.values[21:], values[::-1])
+
+
+SYSTEM = """
+import jax.numpy as jnp
+from jaxcam import HybridSystem
+
+FACTOR = 1.0
+
+
+def spring(x):
+    return FACTOR * x
+
+
+class Driven(HybridSystem):
+    state_names = ("position", "velocity")
+    omega: float = 2.0
+
+    def vector_field(self, t, state):
+        push = jnp.cos(self.omega * t)
+        return jnp.stack([state[1], push - spring(state[0]) - 0.1 * state[1]])
+
+    def gap(self, t, state):
+        return 9.0 - state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -0.5 * state[1]])
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.omega
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("0.1 * state[1]", "0.2 * state[1]"),
+        ("FACTOR = 1.0", "FACTOR = 1.5"),
+        ("FACTOR * x", "FACTOR * jnp.sin(x)"),
+        ("2 * jnp.pi", "4 * jnp.pi"),
+    ],
+)
+def test_an_edited_system_is_another_sweep(tmp_path, old, new):
+    """Its class and numbers are the same; its code, or what that uses, is not."""
+
+    def about(code):
+        (tmp_path / "driven.py").write_text(code)
+        system = system_class(f"{tmp_path}/driven.py:Driven")()
+        return about_section(as_section(system))
+
+    first = about(SYSTEM)
+    assert about(SYSTEM + "# a comment") == first
+    assert old in SYSTEM and about(SYSTEM.replace(old, new)) != first
+
+
+def test_what_to_do_with_the_sweep_of_an_edited_system(tmp_path):
+    def run(resume=False, **options):
+        section = Stroboscopic(ImpactOscillator(**options), lanes=1)
+        return diagram(
+            section, "omega", [2.6], [0.0, 0.0], turns=2, keep=1, out=tmp_path / "d",
+            resume=resume,
+        )  # fmt: skip
+
+    run(wall=0.1)
+    for resume in (False, True):
+        with pytest.raises(ValueError, match="delete it if you edited the system"):
+            run(resume, wall=0.2)
+    with pytest.raises(ValueError, match="resume=True to continue it"):
+        run(wall=0.1)
+
+
+def test_shipped_systems_are_known_by_their_version():
+    assert "code of the system" not in about_section(as_section(ImpactOscillator()))

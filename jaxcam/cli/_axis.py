@@ -22,15 +22,24 @@ class Axis(NamedTuple):
 
     @staticmethod
     def of(
-        parameter: str, system: str, units: Mapping[str, str] | None = None
+        parameter: str,
+        system: str,
+        units: Mapping[str, str] | None = None,
+        unit: str | None = None,
     ) -> "Axis":
         """Return the axis of a parameter of a system, both given by name.
 
-        **Arguments:** `units`: the known units of parameters, by parameter name.
+        **Arguments:** `units`: the known units of parameters, by parameter name;
+        `unit`: that of this parameter, if it is given on the command line.
+
+        Raises:
+            ValueError: The speed of a cam-follower is always in rpm.
         """
         if parameter == "speed" and system == CAM:
+            if unit not in (None, "rpm"):
+                raise ValueError(f"--unit is {unit!r}, but the speed is in rpm.")
             return Axis(parameter, math.pi / 30, "rpm")
-        return Axis(parameter, 1.0, (units or {}).get(parameter, ""))
+        return Axis(parameter, 1.0, unit or (units or {}).get(parameter, ""))
 
     @property
     def in_rpm(self) -> bool:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from ._corner_warning import warn_of_corners
 from ._files_options import Files
 
 
@@ -36,7 +37,9 @@ def read(case: Path, rig: Path | None, files: Files, system: str | None = None):
     usual = folder / "rig.toml" if rig is None else rig
     if system is not None or (usual.is_file() and is_setup(usual)):
         setup = read_setup(_rig_file(folder, rig), system)
-        return setup.known_of(_runs(case, setup.channels, files, setup.files)), setup
+        warn_of_corners(setup.model.system)
+        runs = _runs(case, setup.channels, files, setup.files)
+        return setup.known_of(runs, picked=case.is_file()), setup
     layout = read_layout(usual, read_tables(usual) if usual.is_file() else {})
     runs = _runs(case, CAM_FOLLOWER, files, layout)
     return runs, read_rig(_rig_file(folder, rig))

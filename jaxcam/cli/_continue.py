@@ -54,11 +54,11 @@ def continue_(
 
     from ._cache import keep_compiled_programs
     from ._output import Output
-    from ._parameters import make_model, parameters, pick_by_name
+    from ._parameters import chosen_parameter, make_model, parameters, pick_by_name
     from ._progress import progress
 
     keep_compiled_programs()
-    axis = Axis.of(along.parameter, system, source.units())
+    axis = Axis.of(along.parameter, system, source.units(), along.unit)
     model = along.started(make_model(system, preset, None, source, set_), axis)
     guess = following.guess
     output = Output(json_file, out)
@@ -72,7 +72,7 @@ def continue_(
         branch = continuation.branch(
             start.problem,
             start,
-            pick_by_name(along.parameter),
+            pick_by_name(chosen_parameter(model, along.parameter)),
             (axis.unit * low, axis.unit * high),
             getattr(continuation, ALGORITHMS[following.algorithm])(),
             settings=continuation.BranchSettings(max_points=following.max_points),

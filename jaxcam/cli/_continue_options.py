@@ -8,7 +8,7 @@ import typer
 from ._axis import Axis, ordered_bounds
 from ._checks import at_least, numbers
 from ._choices import choose
-from ._options import Highest, Lowest
+from ._options import Highest, Lowest, Unit
 
 
 ALGORITHMS = {
@@ -32,6 +32,7 @@ class BranchRange:
     ] = "speed"
     low: Lowest = None
     high: Highest = None
+    unit: Unit = None
     at: Annotated[
         float | None,
         typer.Option(
@@ -54,16 +55,11 @@ class BranchRange:
         import equinox as eqx
         import jax.numpy as jnp
 
-        from ._parameters import parameters, pick_by_name
+        from ._parameters import chosen_parameter, parameters, pick_by_name
 
-        name, (low, high) = self.parameter, self.bounds
-        known = {k: v for k, v in parameters(model).items() if not isinstance(v, list)}
-        if name not in known:
-            raise ValueError(
-                f"--parameter {name} does not exist; the parameters are "
-                f"{', '.join(known)}."
-            )
-        value = known[name] / axis.unit if self.at is None else self.at
+        name, (low, high) = chosen_parameter(model, self.parameter), self.bounds
+        usual = parameters(model)[name]
+        value = usual / axis.unit if self.at is None else self.at
         if not low <= value <= high:
             raise ValueError(
                 f"the branch starts at {name} = {value:g}, outside {low:g} to "

@@ -11,6 +11,12 @@ from ._grouped import grouped
 from ._options import Case, OwnSystem, Resume, RigFile
 
 
+_ONLY_CAMS = (
+    "Bifurcation speeds are predicted only for a cam-follower; for this rig, use "
+    "`jaxcam diagram --system model.json`."
+)
+
+
 @grouped
 def diagnose(
     case: Case,
@@ -21,7 +27,7 @@ def diagnose(
     predict: Annotated[
         bool,
         typer.Option(
-            help="Predict bifurcation speeds with and without the missing physics."
+            help="Predict the bifurcation speeds of a cam-follower with the effects."
         ),
     ] = True,
     propose: Annotated[
@@ -173,13 +179,18 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
     from ._outlook import Outlook
 
     outlook = Outlook()
-    if predict and found.verdict != discrepancy.Verdict.UNKNOWN:
+    if predict and found.verdict == discrepancy.Verdict.UNKNOWN:
+        outlook = Outlook(
+            reason="No bifurcation speeds are predicted, because part of the missing "
+            "physics is unknown."
+        )
+    elif predict:
         words = "predicting with and without the missing physics"
         report(words, None)
         predicted = discrepancy.predictions(
             found, progress=lambda share: report(words, share)
         )
-        outlook = Outlook(predicted)
+        outlook = Outlook(predicted, reason="" if predicted else _ONLY_CAMS)
     if propose and any(one.element is not None for one in found.missing):
         report(
             "no recording is recommended, because a force with an internal state was "
@@ -204,6 +215,8 @@ def _print(output, found, notes, outlook) -> None:
     output.print(held_out_error(found))
     for table in outlook.tables():
         output.print(terminal_table(table))
+    if outlook.reason:
+        output.print(outlook.reason)
     if output.folder is not None:
         output.print(f"Report: {output.folder / 'index.html'}")
         model = output.folder / "model.json"

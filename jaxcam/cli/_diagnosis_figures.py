@@ -57,13 +57,14 @@ _MISSING = (
     "absorbed any part that they can represent."
 )
 _UNSEEN = (
-    "Residuals of held-out sections of a recording, predicted one flight ahead after a "
-    "fit to the other sections: the textbook model (top), and the model with the "
-    "missing effects (bottom). The band is +-2 standard deviations of the noise."
+    "Residuals of held-out sections of one recording, that in which the missing "
+    "effects improve the prediction most, predicted one flight ahead after a fit to "
+    "the other sections: the textbook model (top), and the model with the missing "
+    "effects (bottom). The band is +-2 standard deviations of the noise."
 )
 _UNSEEN_ALONE = (
-    "Residuals of held-out sections of a recording, predicted one flight ahead by the "
-    "textbook model after a fit to the other sections. The band is +-2 standard "
+    "Residuals of held-out sections of one recording, predicted one flight ahead by "
+    "the textbook model after a fit to the other sections. The band is +-2 standard "
     "deviations of the noise."
 )
 _MAPS = (

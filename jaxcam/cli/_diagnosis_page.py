@@ -1,5 +1,6 @@
 """The report of `jaxcam diagnose` as one HTML file, section by section."""
 
+import math
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -13,6 +14,8 @@ from ._page import figure_html, prose, sentences, STYLE, table_html
 from ._residual_axes import REACH
 
 
+# Fewest and most digits of a fitted value
+_FEWEST, _MOST = 3, 10
 _PARTS = {"flight": "in flight", "impact": "at impacts", "contact": "in contact"}
 
 
@@ -40,6 +43,8 @@ def diagnosis_page(
             table_html(one.headings, one.rows, text=(0,)),
             f'<p class="note">{prose(one.note)}</p>',
         ]
+    if outlook.reason:
+        parts.append(f'<p class="note">{prose(outlook.reason)}</p>')
     parts += [*_left_over(found), *_parameters(found), *_limits(found)]
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -91,7 +96,19 @@ def _effects(found: Diagnosis) -> list[str]:
     return [
         "<h2>Missing physics</h2>",
         table_html(headings, rows, text=(0, 1, 2)),
+        *_per_mass(found),
         *_knockoffs(found),
+    ]
+
+
+def _per_mass(found: Diagnosis) -> list[str]:
+    """Explain the unit of the strengths of forces."""
+    if not any(effect.where in ("flight", "contact") for effect in found.effects):
+        return []
+    return [
+        '<p class="note">The strengths of forces are per unit mass: multiply by the '
+        "mass (of an angle: by the moment of inertia) to obtain a force (a torque)."
+        "</p>"
     ]
 
 
@@ -186,21 +203,44 @@ def _left_over(found: Diagnosis) -> list[str]:
 def _parameters(found: Diagnosis) -> list[str]:
     columns = 2 if changed(found) else 1
     rows = [
-        (name, *(f"{one:+.2f}" for one in pulls[:columns]))
+        (name, _fitted(found, name), *(f"{one:+.2f}" for one in pulls[:columns]))
         for name, pulls in found.pulls.items()
     ]
-    headings = ("parameter", "textbook model", "with the missing effects")
-    note = "Deviation from the rig file, in units of the tolerance stated there."
+    headings = (
+        "parameter",
+        "fitted value",
+        "deviation: textbook model",
+        "deviation: with the missing effects",
+    )
+    note = (
+        "Fitted values are given with their standard errors. A deviation is the "
+        "difference from the rig file, in units of the tolerance stated there."
+    )
     if changed(found):
         note += (
-            " A parameter that deviates in the first column but not in the second "
-            "compensated for the missing physics."
+            " The fitted values are those of the model with the missing effects. A "
+            "parameter that deviates in the textbook model but not with the missing "
+            "effects compensated for the missing physics."
         )
     return [
         "<h2>Parameters of the rig</h2>",
-        table_html(headings[: 1 + columns], rows, text=(0,)),
+        table_html(headings[: 2 + columns], rows, text=(0,)),
         f'<p class="note">{note}</p>',
     ]
+
+
+def _fitted(found: Diagnosis, name: str) -> str:
+    """Return a fitted value with all of its significant digits."""
+    one = found.rig.get(name)
+    if one is None:
+        return ""
+    digits = _FEWEST
+    if one.value and 0 < one.stderr < math.inf:
+        places = (math.floor(math.log10(x)) for x in (abs(one.value), one.stderr))
+        digits = next(places) - next(places) + 1
+    digits = min(max(digits, _FEWEST), _MOST)
+    unit = "" if one.unit == "-" else one.unit
+    return f"{one.value:.{digits}g} +- {one.stderr:.1g} {unit}".rstrip()
 
 
 def _limits(found: Diagnosis) -> list[str]:

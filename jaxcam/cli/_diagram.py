@@ -58,13 +58,14 @@ def diagram(
     from ._cache import keep_compiled_programs
     from ._natural_start import natural_start
     from ._output import Output
-    from ._parameters import make_model, parameters
+    from ._parameters import chosen_parameter, make_model, parameters
     from ._progress import COMPILING, progress
 
     keep_compiled_programs()
     model = make_model(system, preset, None, source, set_)
     where.check_system(model)
-    axis = Axis.of(sweep.parameter, system, source.units())
+    picked = chosen_parameter(model, sweep.parameter)
+    axis = Axis.of(sweep.parameter, system, source.units(), sweep.unit)
     states, words = starts.states(sweep), ""
     if source and states is None:
         states, words = natural_start(model, source)
@@ -73,7 +74,7 @@ def diagram(
     with where.running() as running, progress(COMPILING) as report:
         made = sweeps.diagram(
             looked,
-            sweep.parameter,
+            picked,
             axis.unit * np.linspace(*sweep.bounds, sweep.points),
             states,
             turns=sweep.turns,

@@ -8,7 +8,7 @@ import typer
 from ._axis import ordered_bounds
 from ._checks import at_least, check_size, numbers
 from ._choices import choose
-from ._options import Highest, Lowest
+from ._options import Highest, Lowest, Unit
 
 
 DIRECTIONS = ("each", "up", "down", "both")
@@ -27,6 +27,7 @@ class Sweep:
     ] = "speed"
     low: Lowest = None
     high: Highest = None
+    unit: Unit = None
     points: Annotated[
         int, typer.Option(metavar="N", help="Number of parameter values.")
     ] = 200

@@ -52,7 +52,7 @@ def correlation_table(found: Fit) -> Table:
     for heading in ("parameter", "other parameter"):
         table.add_column(heading, no_wrap=True)
     table.add_column("correlation", justify="right")
-    names = [one.name for one in found.estimates]
+    names = [one.label for one in found.estimates]
     pairs = [
         (abs(found.correlation[i, k]), found.correlation[i, k], names[i], names[k])
         for i in range(len(names))

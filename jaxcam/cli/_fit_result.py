@@ -10,6 +10,7 @@ import equinox as eqx
 from .. import fitting
 from ..discrepancy import Policy
 from ..recordings import Recording, Rig, segment_case, Segments
+from ..tables import counted
 from ._fit_report import correlation_table, nominal_value, parameter_table
 from ._impact_laws import impact_laws
 from ._output import Output
@@ -20,6 +21,8 @@ from ._saved_system import as_saved
 _SURE = 3.0
 # Ratio of rms residual to noise above which the columns may have other units
 _HOPELESS = 1000.0
+# Number of tolerances by which a value must have moved for the same suspicion
+_FAR = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +36,8 @@ class Result:
     seen: fitting.Identifiability
     laws: Mapping[str, fitting.RestitutionFit]
     again: fitting.Bootstrap | None
+    doubted: str = ""
+    """A doubt about the units of a channel, as a sentence, or empty."""
 
     @property
     def quality(self) -> list[dict[str, Any]]:
@@ -57,8 +62,8 @@ class Result:
         ratio = sum(q["ratio"] for q in quality) / len(quality)
         sentence = (
             f"The rms residual of {self.problem.samples} samples of "
-            f"{len(self.problem.records)} recordings is {ratio:.3f} times the sensor "
-            "noise."
+            f"{counted(len(self.problem.records), 'recording')} is {ratio:.3f} times "
+            "the sensor noise."
         )
         if ratio > Policy().as_noise and len(self.problem.records) > 1:
             sentence += (
@@ -72,12 +77,24 @@ class Result:
                     "two samples; if it is continuous, write `interpolation = "
                     '"linear"` under [input] in the rig file.'
                 )
-        if ratio > _HOPELESS:
+        if ratio > _HOPELESS or self._strange(ratio):
             sentence += (
                 " Check the units, the signs and the order of the columns first (deg "
                 "or rad, ms or s, mm or m)."
             )
         return sentence
+
+    def _strange(self, ratio: float) -> bool:
+        """Return whether a value lies so far from its tolerance, or a poor fit ends so
+        close to a bound, that a column may have another unit or sign.
+        """
+        for one in self.after.estimates:
+            moved = abs(one.value - nominal_value(self.problem, one.name))
+            if moved > _FAR * self.problem.parameter(one.name).tolerance:
+                return True
+        at_bound = fitting.Doubt.ON_A_BOUND
+        poor = ratio > Policy().as_noise
+        return poor and any(one.doubt is at_bound for one in self.after.reasons)
 
     @property
     def outside(self) -> list[str]:
@@ -109,6 +126,7 @@ class Result:
             "notes": about["notes"],
             "identifiability": self.seen.sentences(),
             "most_correlated": self.after.most_correlated(),
+            "units_in_doubt": self.doubted,
             "outside_tolerance": self.outside,
             "residuals": self.quality,
             "restitution": {name: law.sentence() for name, law in self.laws.items()},
@@ -146,7 +164,7 @@ def fitted(
     Raises:
         ValueError: No parameter of the rig has a tolerance.
     """
-    runs = tuple(runs)
+    runs, doubted = tuple(runs), ""
 
     def cutting(share: float) -> None:
         report("finding impacts and contacts", share)
@@ -160,6 +178,7 @@ def fitted(
                 "of [parameters] in the rig file."
             )
         segments = nominal.segments(moved, progress=cutting)
+        doubted = nominal.contact_in_doubt(segments)
     else:
         model = fitting.cam_follower_model(nominal)
         parameters = fitting.cam_follower_parameters(nominal)
@@ -185,7 +204,7 @@ def fitted(
         again = fitting.bootstrap(
             after, bootstrap, progress=lambda k, n: report("bootstrap", k / n)
         )
-    return Result(problem, segments, before, after, seen, laws, again)
+    return Result(problem, segments, before, after, seen, laws, again, doubted)
 
 
 def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
@@ -193,7 +212,8 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
 
     If a fit failed, the reason goes to standard error instead.
     """
-    for sentence in (*notes, *found.seen.sentences()):
+    doubts = (found.doubted,) if found.doubted else ()
+    for sentence in (*notes, *doubts, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))
     output.print(correlation_table(found.after))

@@ -65,6 +65,15 @@ Highest: TypeAlias = Annotated[
         "--to", metavar="B", help="Upper bound (rpm for the speed of the cam)."
     ),
 ]
+Unit: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--unit",
+        metavar="TEXT",
+        help="Unit of the parameter, for tables and figures; default: that in the rig "
+        "file.",
+    ),
+]
 Workers: TypeAlias = Annotated[
     int | None,
     typer.Option(

@@ -26,6 +26,10 @@ class Outlook:
 
     speeds: tuple[Prediction, ...] = ()
     experiments: tuple[Experiment, ...] = ()
+    reason: str = ""
+    """A sentence on why no speeds are predicted; empty if they are or if none were
+    requested.
+    """
 
     def tables(self) -> Iterator[Rows]:
         """Return the tables that are not empty; speeds are in rpm."""

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..hybrid import HybridSystem
 from ..models import CamFollower, ConstantRestitution
+from ._corner_warning import warn_of_corners
 from ._source import make_system, Source
 
 
@@ -29,15 +30,47 @@ def make_model(
 ) -> HybridSystem:
     """Create a system with the parameters given on the command line.
 
+    A warning is printed if a user's system is not smooth.
+
     Raises:
         ValueError: A name or value is invalid; the message says how to fix it.
     """
-    return assign_parameters(make_system(name, preset, rpm, source), assignments or ())
+    system = make_system(name, preset, rpm, source)
+    if source:
+        warn_of_corners(system)
+    return assign_parameters(system, assignments or ())
 
 
 def parameters(system: HybridSystem) -> dict[str, float]:
     """Return all parameters and their values, in SI units."""
     return {name: _plain(leaf) for name, leaf in _leaves(system).items()}
+
+
+def full_name(name: str, known: Collection[str]) -> str:
+    """Return the full name of a parameter given by the end of its name, as in
+    `frequency` for `base.frequency`, if no other name ends like it.
+    """
+    ends = [one for one in known if one.endswith(f".{name}")]
+    return ends[0] if name not in known and len(ends) == 1 else name
+
+
+def chosen_parameter(system: HybridSystem, name: str) -> str:
+    """Return the full name of the parameter given by `--parameter`.
+
+    Raises:
+        ValueError: There is no such parameter that is a single number.
+    """
+    found = parameters(system)
+    known = [one for one, value in found.items() if not isinstance(value, list)]
+    name = full_name(name, known)
+    if name not in known:
+        missing = (
+            "Give the parameter to vary with --parameter NAME"
+            if name == _SPEED
+            else f"--parameter {name} does not exist"
+        )
+        raise ValueError(f"{missing}; the parameters are: {', '.join(known)}.")
+    return name
 
 
 def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> HybridSystem:
@@ -56,6 +89,7 @@ def assign_parameters(system: HybridSystem, assignments: Sequence[str]) -> Hybri
             system = eqx.tree_at(lambda s: s.restitution, system, law)
             continue
         leaves = _leaves(system)
+        name = full_name(name, leaves)
         if name == _SPEED and name in leaves and _in_rpm(system):
             raise ValueError(f"--set {assignment}: use --speed, with the speed in rpm.")
         if name not in leaves:

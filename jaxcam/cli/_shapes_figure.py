@@ -104,7 +104,7 @@ def _evidence(one: Structure) -> str:
     if one.gain > one.threshold and not one.significant:
         return "not significant: differs between recordings"
     word = "significant" if one.significant else "not significant"
-    return f"{word}: gain {one.gain:.3g}, {one.threshold:.3g} required"
+    return f"{word}: gain in 2 ln L {one.gain:.3g},\n{one.threshold:.3g} required"
 
 
 def _band(axis, one: Structure, color) -> None:

@@ -8,6 +8,10 @@ import scipy.stats
 from jaxtyping import Bool, Float
 
 
+# Correlation below which knowing one parameter hardly helps to determine another
+_WEAK = 0.1
+
+
 @dataclasses.dataclass(frozen=True)
 class Ellipse:
     """Joint confidence region of d parameters, an ellipse or an ellipsoid.
@@ -114,6 +118,12 @@ def most_correlated(labels: Sequence[str], correlation) -> str:
         return "No two fitted parameters are correlated."
     i, k = divmod(int(np.argmax(size)), len(labels))
     value = float(np.clip(correlation[i, k], -1.0, 1.0))
+    if abs(value) < _WEAK:
+        return (
+            "The errors of the fitted parameters hardly depend on each other: the "
+            f"strongest correlation, between {labels[k]} and {labels[i]}, is "
+            f"{value:+.4f}."
+        )
     kept = max(1 - value**2, np.finfo(float).eps) ** 0.5
     together = "in opposite directions" if value < 0 else "together"
     return (

@@ -11,6 +11,7 @@ import numpy as np
 from ._descend import descend, Descent, Objective, TOLERANCE
 from ._doubts import poor_fit
 from ._fit_result import finish, Fit
+from ._own_value_starts import own_value_starts
 from .engine import (
     already_loose,
     free_columns,
@@ -128,11 +129,15 @@ def _other_starts(objective: Objective, point: Point, loosely: Callable[[], Poin
     """Yield other starting points for a poor fit.
 
     Each is the result of a fit with loose joints, first from the given point, then with
-    parameters multiplied by a few factors: the cost of an oscillation over many periods
-    has many local minima.
+    other values of the parameters that differ between recordings, and with parameters
+    multiplied by a few factors: the cost of an oscillation over many periods has many
+    local minima.
     """
     yield loosely()
     problem = objective.problem
+    own = own_value_starts(_loose(objective), point)
+    if own is not None:
+        yield descend(_loose(objective), own, _ITERATIONS).point
     values = np.asarray(point.values)
     for factor in _FACTORS:
         moved = np.array(values)

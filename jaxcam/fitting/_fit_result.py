@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from ..tables import ShortTable
+from ..tables import counted, ShortTable
 from ._doubts import (
     Doubt,
     not_finite,
@@ -107,9 +107,8 @@ class Fit:
 
     def _table(self) -> ShortTable:
         """Return a table of the outcome and the estimates."""
-        count = (
-            f"{self.problem.samples} samples, {len(self.problem.records)} recordings"
-        )
+        runs = counted(len(self.problem.records), "recording")
+        count = f"{self.problem.samples} samples, {runs}"
         trusted = "converged" if self.converged else "not trustworthy"
         rows = [
             (one.label, f"{one.value:.7g}", f"{one.stderr:.2g}", one.unit)

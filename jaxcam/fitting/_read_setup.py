@@ -191,7 +191,15 @@ def _records(
                     name,
                     "is fitted or measured; remove it from [records]",
                 )
-            values[name] = inner.quantity(key, None).value
+            known_value = inner.quantity(key, None)
+            if known_value.tolerance > 0:
+                raise inner.error(
+                    name,
+                    "has a tolerance, but the values in [records] are known; to fit "
+                    "a value of its own for each recording, state the tolerance in "
+                    f"[parameters], with per_record = true, and remove `{name}` here",
+                )
+            values[name] = known_value.value
         found[pattern] = values
     return found
 

@@ -1,6 +1,7 @@
 """Fit restitution laws to all recorded impacts, or by the method of the thesis."""
 
 import dataclasses
+import re
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -73,8 +74,9 @@ class RestitutionFit:
             for n, v, e in zip(self.names, self.values, self.stderr)
         )
         ratio = self.cost / max(1, self.freedom)
+        name = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self.law).__name__)
         found = (
-            f"{type(self.law).__name__}: {parts}; the residual is {ratio:.2f} times "
+            f"{name.capitalize()}: {parts}; the residual is {ratio:.2f} times "
             f"the noise for {self.freedom + len(self.names)} impacts."
         )
         if self.converged:

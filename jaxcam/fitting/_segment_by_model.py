@@ -4,41 +4,28 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..hybrid.programs import program
 from ..recordings import Recording, RecordingError, segment
 from ..recordings.cut import (
     Drive,
     GivenImpacts,
-    padded,
     read_drive,
-    saturated,
     segment_gaps,
     Segments,
 )
-from ._gap_rates import gap_rates
+from ._measured_gaps import measured_gaps, measured_states
 from ._missed_impacts import Spans, with_missed_impacts
 from ._time_unit import refuse_slow_samples
 from .engine import (
-    DriveState,
-    Layout,
     measured_components,
     Model,
     Parameter,
-    parameter_places,
     primary_channel,
-    state_size,
     with_constants,
 )
 from .flown import located, shortest_period, with_coarse_note
-
-
-# Number of samples at which the dependence of a gap on the state is evaluated
-_LOOKS = 64
 
 
 def segment_by_model(
@@ -103,7 +90,7 @@ def segment_by_model(
     picks = {component: name for name, component in reversed(measured)}
     gaps = []
     for recording in sorted(recordings, key=lambda one: -one.interval)[:1]:
-        usual = np.nanmedian(_states(model, picks, recording), axis=0)
+        usual = np.nanmedian(measured_states(model, picks, recording), axis=0)
         refuse_slow_samples(with_constants(model, recording), recording, usual)
     for k, recording in enumerate(recordings):
         if progress is not None:
@@ -144,9 +131,9 @@ class _ShownGaps(NamedTuple):
 
 def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGaps:
     drive = None if drive_channel is None else read_drive(recording, drive_channel)
-    states = _states(model, picks, recording)
+    states = measured_states(model, picks, recording)
     here = with_constants(model, recording)
-    gaps, slopes, errors, rates = _gaps(
+    gaps, slopes, errors, rates = measured_gaps(
         here, parameters, recording, states, drive, picks
     )
     shown = np.any(slopes != 0, axis=-1)
@@ -180,76 +167,6 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
         rates=shown.rates,
         given=shown.given,
     )
-
-
-def _states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
-    """Return the state at each sample; components that are not measured are zero."""
-    size = state_size(model)
-    states = np.zeros((len(recording), size))
-    for place, name in picks.items():
-        sensor = model.sensors[name]
-        samples = (recording[name] - float(sensor.offset)) / float(sensor.gain)
-        states[:, place] = samples
-    return states
-
-
-def _gaps(model: Model, parameters, recording, states, drive: Drive | None, picks):
-    """Return the gaps `(g, k)`, the largest magnitudes of their derivatives with
-    respect to the state `(g, n)`, their errors `(g,)`, and for each its measured rate
-    of change `(k,)` or `None`.
-    """
-    layout = Layout(model, parameter_places(model, parameters))
-    values = np.array([float(p.where(model)) for p in parameters])
-    tolerances = np.array([p.tolerance for p in parameters])
-    count = len(recording)
-    moving = (
-        (np.zeros(count), np.ones(count), np.zeros(count))
-        if drive is None
-        else (drive.angle, drive.rate, drive.acceleration.values)
-    )
-    columns = [padded(part) for part in (recording.time, states, *moving)]
-    gaps = np.asarray(_gap(layout, values, *columns))[:count].T
-    rows = np.linspace(0, count - 1, _LOOKS).astype(int)
-    looks = [part[rows] for part in columns]
-    by_state, by_value = (np.asarray(x) for x in _slopes(layout, values, *looks))
-    slopes = np.max(np.abs(by_state), axis=0)
-    moved = np.max(np.abs(by_value), axis=0)
-    # a parameter that does not affect a gap and has no tolerance must not give zero
-    # times infinity
-    parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
-    rates: list = [None] * len(gaps)
-    clear = [k for k, name in picks.items() if not np.any(saturated(recording[name]))]
-    if len(picks) > 1:
-        found = gap_rates(layout, values, tuple(columns), tuple(looks), clear)
-        rates = [None if rate is None else rate[:count] for rate in found]
-    return gaps, slopes, np.sum(parts, axis=-1), rates
-
-
-@program
-def _gap(layout: Layout, values, times, states, *drive):
-    return jax.vmap(lambda *at: _gaps_at(layout, values, *at))(
-        *(jnp.asarray(x) for x in (times, states, *drive))
-    )
-
-
-@program
-def _slopes(layout: Layout, values, times, states, *drive):
-    """Return the derivatives of the gaps with respect to the state and the parameters,
-    sample by sample.
-    """
-
-    def one(time, state, *drive):
-        by_state = jax.jacfwd(lambda x: _gaps_at(layout, values, time, x, *drive))
-        by_value = jax.jacfwd(lambda v: _gaps_at(layout, v, time, state, *drive))
-        return by_state(state), by_value(values)
-
-    values = jnp.asarray(values)
-    return jax.vmap(one)(*(jnp.asarray(x) for x in (times, states, *drive)))
-
-
-def _gaps_at(layout: Layout, values, time, state, *drive):
-    system = layout.at(jnp.asarray(values)).driven(time, DriveState(*drive))
-    return jnp.atleast_1d(system.gap(time, state))
 
 
 def _refuse_unseen(model: Model, picks, recording, slopes) -> None:

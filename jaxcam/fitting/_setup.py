@@ -12,6 +12,7 @@ import numpy as np
 
 from ..recordings import read_case, Recording, RecordingError, Segments
 from ..recordings.files import Case, FileLayout
+from ._contact_in_doubt import contact_in_doubt
 from ._lags import without_lags
 from ._segment_by_model import segment_by_model
 from .engine import Input, Model, Parameter, Problem
@@ -86,21 +87,34 @@ class Setup:
         )
         return self.known_of(case)
 
-    def known_of(self, case: Case) -> Case:
+    def known_of(self, case: Case, *, picked: bool = False) -> Case:
         """Return the case with the constants that the rig file gives for each
         recording.
+
+        Args:
+            case: The case.
+            picked: Whether the case contains only some of the recordings of the rig.
+                Constants of other recordings are then noted in the `meta["notes"]` of
+                the first one.
 
         Raises:
             RecordingError: Constants belong to a recording that does not exist.
         """
+        runs, notes = tuple(self._with_known(run) for run in case), []
         for pattern in self.records:
-            if not any(_fits(run.name, pattern) for run in case):
+            if any(_fits(run.name, pattern) for run in case):
+                continue
+            unused = f'[records."{pattern}"] of the rig file matches none of the'
+            if not picked:
                 names = ", ".join(f"`{run.name}`" for run in case)
                 raise RecordingError(
-                    f'{case.name}: [records."{pattern}"] of the rig file matches none '
-                    f"of the recordings; they are {names}."
+                    f"{case.name}: {unused} recordings; they are {names}."
                 )
-        runs = tuple(self._with_known(run) for run in case)
+            notes.append(f"{unused} given recordings, so it is not used.")
+        if notes and runs:
+            first = runs[0]
+            meta = {**first.meta, "notes": (*first.meta.get("notes", ()), *notes)}
+            runs = dataclasses.replace(first, meta=meta), *runs[1:]
         return dataclasses.replace(case, recordings=runs)
 
     def _with_known(self, run: Recording) -> Recording:
@@ -147,6 +161,13 @@ class Setup:
             )
         )
         return tuple(run if isinstance(run, Segments) else next(cut) for run in runs)
+
+    def contact_in_doubt(self, segments: Iterable[Segments]) -> str:
+        """Return a sentence if no recording shows an impact although the system has
+        stops, or if a recording lies far beyond a stop: the unit of a column may be
+        wrong. The sentence is empty if there is no such doubt.
+        """
+        return contact_in_doubt(self.model, self.parameters, tuple(segments))
 
     def _refuse_still(self, run: Recording) -> None:
         """Raise `RecordingError` for a sensor of the motion that shows no motion."""

@@ -8,7 +8,7 @@ from ..recordings.files import known_keys, printable, Section, shown_value
 from .engine import Parameter
 
 
-NUMBER = ("value", "tolerance", "lower", "upper", "unit")
+NUMBER = ("value", "tolerance", "lower", "upper", "unit", "per_record")
 """Keys that a number with a tolerance may have."""
 
 
@@ -20,6 +20,7 @@ class Stated(NamedTuple):
     lower: float = -math.inf
     upper: float = math.inf
     unit: str = ""
+    per_record: bool = False
 
     def parameter(self, name: str, where: Callable, unit: str = "") -> Parameter:
         """Return the parameter of a fit, with the `unit` if the file gives none."""
@@ -29,6 +30,7 @@ class Stated(NamedTuple):
             self.tolerance,
             lower=self.lower,
             upper=self.upper,
+            per_record=self.per_record,
             unit=self.unit or unit,
         )
 
@@ -60,4 +62,16 @@ def stated(section: Section, key: str) -> Stated:
     unit = entry.get("unit", "")
     if not isinstance(unit, str):
         raise section.error(key, f"has the unit {shown_value(unit)}, which is not text")
-    return Stated(value, float(tolerance), lower, upper, unit)
+    own = entry.get("per_record", False)
+    if not isinstance(own, bool):
+        raise section.error(
+            key, f"has per_record = {shown_value(own)}, and must have true or false"
+        )
+    if own and not tolerance:
+        raise section.error(
+            key,
+            "has per_record = true but no tolerance; give the tolerance within which "
+            "each recording has a value of its own, or give known values under "
+            "[records]",
+        )
+    return Stated(value, float(tolerance), lower, upper, unit, own)

@@ -86,7 +86,8 @@ def corners(system: HybridSystem, state: VectorLike) -> list[Corner]:
     their arguments, or the condition of a `where`, depend on time or state. A
     simulation crosses such a corner with shortened steps and a larger error, whereas a
     [`jaxcam.hybrid.SwitchedSystem`][] locates it as an event. A `where` that only
-    avoids a division by zero is reported as well.
+    avoids a division by zero is reported as well. Quadratic drag, `v * abs(v)`, is not
+    reported, nor are operations that depend only on time in a system with breakpoints.
 
     Args:
         system: The system.
@@ -116,9 +117,11 @@ def corners(system: HybridSystem, state: VectorLike) -> list[Corner]:
         functions["vector_field"] = system.vector_field
     functions |= {"gap": system.gap, "impact": system.impact}
     found: dict[Corner, None] = {}
+    # steps end at breakpoints, so a switch at a fixed time is harmless
+    moving = [system.breakpoints is None, True]
     for name, function in functions.items():
         closed = jax.make_jaxpr(function)(jnp.zeros(()), state)
-        seen = _corners_in(closed.jaxpr, [True, True], None)
+        seen = _corners_in(closed.jaxpr, moving, None)
         found |= {Corner(name, operation, *place): None for operation, place in seen}
     return list(found)
 
@@ -139,7 +142,9 @@ def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
             continue
         name = equation.primitive.name
         place = where or (None, _place(equation))
-        if _is_corner(equation, name, moves):
+        if _is_corner(equation, name, moves) and not _is_squared(
+            jaxpr, equation, depends
+        ):
             yield place[0] or _CORNERS.get(name, "where"), place[1]
         inside = _inside(equation)
         if inside is not None and len(inside.invars) == len(moves):
@@ -161,6 +166,34 @@ def _is_corner(equation, name, moves) -> bool:
     if name in ("max", "min", "abs", "sign", "sort"):
         return jnp.issubdtype(equation.outvars[0].aval.dtype, jnp.inexact)
     return name in _CORNERS
+
+
+@no_type_check
+def _is_squared(jaxpr, equation, depends) -> bool:
+    """Return whether an absolute value, or a multiple of it, is used only in products
+    with its argument: `v * abs(v)` has a continuous derivative.
+
+    **Arguments:** `depends`: the results so far that depend on time or state.
+    """
+    if equation.primitive.name != "abs":
+        return False
+    argument, result = equation.invars[0], equation.outvars[0]
+    along, held, used = {id(argument)}, {id(result)}, False
+    for other in jaxpr.eqns:
+        places = [id(v) for v in other.invars if not isinstance(v, Literal)]
+        product, out = other.primitive.name == "mul", id(other.outvars[0])
+        if held.intersection(places):
+            if not product or held.issuperset(places) and len(places) > 1:
+                return False
+            if along.intersection(places):
+                used = True
+            else:
+                held.add(out)
+        elif product and along.intersection(places):
+            # constant multiples of the argument
+            if not depends.intersection(set(places) - along):
+                along.add(out)
+    return used and held.isdisjoint(map(id, jaxpr.outvars))
 
 
 @no_type_check

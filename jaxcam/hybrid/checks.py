@@ -42,7 +42,8 @@ def needs_values(name: str) -> str:
     return (
         f"{name} needs the values of time or state, which are not known during "
         "compilation; write it with jax.numpy (jnp.cos, not np.cos or math.cos), and "
-        "use jnp.where instead of if"
+        "use jnp.where instead of if; a force with a kink (a second spring beyond a "
+        "gap, a soft stop, dry friction) needs a SwitchedSystem: see Switching surfaces"
     )
 
 

@@ -75,8 +75,9 @@ def pick(
 
     Args:
         where: A function of the tree (`lambda system: system.speed`), a dotted name
-            (`"profile.radius"`), or a tuple of those. A function may return several
-            parameters at once.
+            (`"profile.radius"`) or the end of one if no other name ends like it
+            (`"radius"`), or a tuple of those. A function may return several parameters
+            at once.
         tree: A system, or any other pytree with numbers among its leaves.
         integers: Whether integers may vary too; default: floating-point numbers only.
 
@@ -163,6 +164,9 @@ def _places(where: Callable | str, tree, integers) -> tuple[int, ...]:
         names = [name for name, _ in _named_leaves(tree)]
         # a name may be written in Python syntax: terms[0].c1
         name = re.sub(r"\[['\"]?(\w+)['\"]?\]", r".\1", where).lstrip(".")
+        ends = [one for one in names if one.endswith(f".{name}")]
+        if name not in names and len(ends) == 1:
+            (name,) = ends
         if name not in names:
             raise ValueError(
                 f"there is no parameter {where!r}; {_known(tree, integers)}"

@@ -29,6 +29,8 @@ COLOURS = (
 _ROWS = 600
 # smallest and largest dots (points)
 _DOTS = 0.6, 2.4
+# Width of the margin beside the first and the last value, relative to their distance
+_ROOM = 0.01
 # colour of motions without an attractor
 NOTHING = "#FFFFFF"
 
@@ -103,7 +105,10 @@ def sweep_diagram(
     unit = str(diagram.dataset["component_unit"].values[component])
     ax.set_xlabel(labelled(*((diagram.parameter, "") if not x_label else x_label)))
     ax.set_ylabel(labelled(*((name, unit) if y_label is None else y_label)))
-    ax.set_xlim(float(values.min()), float(values.max()))
+    low, high = float(values.min()), float(values.max())
+    # the dots at both ends are fully visible
+    room = _ROOM * (high - low)
+    ax.set_xlim(low - room, high + room)
     if handles:
         _above(ax, handles)
     return figure_of(ax)

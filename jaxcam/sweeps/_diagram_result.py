@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 
 from ..tables import ShortTable
-from .attractors import label_names, Labels
+from .attractors import APERIODIC, drifting, label_names, Labels
 
 
 class Range(NamedTuple):
@@ -70,9 +70,18 @@ class Diagram:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels as text, such as P(1,1) or P(inf,1), shape `(points, starts)`."""
+        """Labels as text, such as P(1,1) or P(inf,1), shape `(points, starts)`.
+
+        A motion without a period whose points still approach each other at the end is
+        "not settled".
+        """
         numbers = Labels(self.dataset["impacts"].values, self.dataset["turns"].values)
-        return label_names(numbers)
+        names, open_ = label_names(numbers), numbers.turns == APERIODIC
+        if np.any(open_):
+            names = names.astype(object)
+            slow = drifting(self.states[open_])
+            names[open_] = np.where(slow, "not settled", names[open_])
+        return names
 
     def ranges(self, start: int = 0) -> list[Range]:
         """Return the labels in order, each with its range of parameter values.

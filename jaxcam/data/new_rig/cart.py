@@ -28,6 +28,8 @@ class Cart(HybridSystem):
     def vector_field(self, t, state):
         """Return the rate of change of the state in free motion: velocity and
         acceleration.
+
+        In a fit, `t` is the time in the time column of the recording.
         """
         position, velocity = state
         acceleration = -self.stiffness * position - self.damping * velocity
@@ -53,8 +55,9 @@ class Cart(HybridSystem):
     # If the drive has an encoder, the system has two fields for it, `speed: float`
     # (rad/s) and `phase: float` (rad), and uses `self.speed * t + self.phase` as the
     # angle of the drive. If only the frequency of each recording is known, a field of
-    # any name holds it; give its values under [records] in the rig file. In both cases,
-    # the system defines its period:
+    # any name holds it; give its values under [records] in the rig file. If the phase
+    # of the drive at t = 0 is unknown, it is a field as well; give it a tolerance and
+    # `per_record = true` in the rig file. A driven system defines its period:
     #
     # @property
     # def period(self):

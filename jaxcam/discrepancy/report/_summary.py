@@ -1,5 +1,6 @@
 """Summarise a verdict in one or two sentences."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from ...fitting import Fit
@@ -149,17 +150,31 @@ def _moved(best: Trial, within: Fit, rig: Sequence[str], policy: Policy) -> str:
     if not best.names:
         return ""
     moved = {
-        name: abs(within[name].value - best.fit[name].value)
-        / max(best.fit[name].stderr, _TINY)
-        for name in rig
+        one.label: abs(within[one.label].value - one.value) / max(one.stderr, _TINY)
+        for one in best.fit.estimates
+        if one.name in rig
     }
     if not moved:
         return ""
-    name = max(moved, key=lambda one: moved[one])
-    if moved[name] < policy.moved_errors:
+    label = max(moved, key=lambda one: moved[one])
+    if moved[label] < policy.moved_errors:
         return ""
+    one = best.fit[label]
+    where = "" if one.record is None else f" of {one.record}"
     return (
         f" Without {'it' if len(best.names) == 1 else 'them'}, the fit would have "
-        f"shifted {spelled(name)} from {best.fit[name].value:.5g} to "
-        f"{within[name].value:.5g}."
+        f"shifted {spelled(one.name)}{where} from {one.value:.5g} to "
+        f"{within[label].value:.5g}{_limit(within, label)}."
     )
+
+
+def _limit(within: Fit, label: str) -> str:
+    """Return words that say that a value is at the limit of its tolerance."""
+    one, problem = within[label], within.problem
+    parameter = problem.parameter(one.name)
+    nominal = parameter.nominal
+    if nominal is None:
+        nominal = float(problem.start.values[0, problem.names.index(one.name)])
+    ends = (nominal - parameter.tolerance, nominal + parameter.tolerance)
+    at_limit = any(math.isclose(one.value, end) for end in ends)
+    return ", the limit of its tolerance" if at_limit else ""

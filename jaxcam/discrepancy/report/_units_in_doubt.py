@@ -1,4 +1,4 @@
-"""The caveat that a channel may have another unit or sign than stated."""
+"""Caveats that a channel may have another unit or sign than stated."""
 
 from collections.abc import Iterator
 
@@ -12,9 +12,11 @@ from ._words import ratio
 def units_in_doubt(
     question: Question, choice: Choice, policy: Policy
 ) -> Iterator[Caveat]:
-    """Return the caveat that the residual is so large that a unit or a sign may be
-    wrong.
+    """Return caveats if the motion does not match the stops, or if the residual is so
+    large that a unit or a sign may be wrong.
     """
+    if question.doubted:
+        yield Caveat(Reason.UNITS, question.doubted)
     # if errors of the model were allowed for, the held-out residual refers to them
     single = [one.residual / one.stated for one in question.model_errors]
     worst = max(single, default=choice.held.after)

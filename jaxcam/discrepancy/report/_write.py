@@ -260,13 +260,19 @@ def _rig_values(
         if one.name not in question.rig:
             continue
         stderr = max(one.stderr, deviation.get(one.name, 0.0))
-        name, value, unit = one.name, one.value, one.unit
-        if name in question.shown:
-            shown = question.shown[name]
-            name, unit = shown.name, shown.unit
+        value, unit = one.value, one.unit
+        if one.name in question.shown:
+            shown = question.shown[one.name]
+            unit = shown.unit
             value, stderr = value / shown.divisor, stderr / shown.divisor
-        found[name] = Value(value, stderr, unit)
+        found[_shown_name(question, one.name, one.label)] = Value(value, stderr, unit)
     return found
+
+
+def _shown_name(question: Question, name: str, label: str) -> str:
+    """Return the name under which a parameter of the system is reported."""
+    shown = question.shown.get(name)
+    return label if shown is None else shown.name
 
 
 def _pulls(
@@ -276,10 +282,13 @@ def _pulls(
     without and with the terms.
     """
     found, problem = {}, question.problem
-    for name in question.rig:
-        place = problem.names.index(name)
+    for one in best.estimates:
+        if one.name not in question.rig:
+            continue
+        place = problem.names.index(one.name)
         nominal = float(problem.start.values[0, place])
-        size = problem.parameter(name).size(nominal)
-        before, after = within[name].value, best[name].value
+        size = problem.parameter(one.name).size(nominal)
+        before, after = within[one.label].value, one.value
+        name = _shown_name(question, one.name, one.label)
         found[name] = (before - nominal) / size, (after - nominal) / size
     return found

@@ -52,6 +52,7 @@ class Question:
         `drive_noise`.
     - `shown`: parameters that are reported in another form.
     - `noisier`: channels with more noise than stated.
+    - `doubted`: a doubt about the units of a channel, as a sentence, or empty.
     - `model_errors`: residuals of the channels, if the fit is so poor that errors of
         the model are allowed for.
     - `looseness`: in that case, error of a joint relative to that of the state of a
@@ -74,6 +75,7 @@ class Question:
     drive_channel: str = "cam_angle_rad"
     shown: Mapping[str, Shown] = dataclasses.field(default_factory=dict)
     noisier: tuple["Noisier", ...] = ()
+    doubted: str = ""
     model_errors: tuple["ModelError", ...] = ()
     looseness: float = 1.0
     location: Location = Location()

@@ -70,10 +70,10 @@ def setup_question(
         check_channels(run.recording if isinstance(run, Segments) else run)
     report("finding impacts and contacts", None)
     setup, runs = setup.without_lags(runs, lags)
-    model = setup.model
-    return system_question(
+    model, segments = setup.model, setup.segments(runs)
+    question = system_question(
         model.system,
-        setup.segments(runs),
+        segments,
         candidates,
         model.sensors,
         setup.parameters,
@@ -84,6 +84,8 @@ def setup_question(
         setup.drive_channel,
         location,
     )
+    doubted = setup.contact_in_doubt(segments)
+    return dataclasses.replace(question, doubted=doubted)
 
 
 def system_question(

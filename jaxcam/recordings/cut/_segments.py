@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ...tables import counted
 from .._drive import Drive
 from .._recording import Recording
 from ._surface import Surface
@@ -189,15 +190,11 @@ class Segments:
         rested = sum(contact.last - contact.first for contact in self.contacts)
         total = len(self.recording)
         return (
-            f"{self.recording.name}: {_counted(len(self.flights), 'flight')} "
+            f"{self.recording.name}: {counted(len(self.flights), 'flight')} "
             f"({flown / total:.0%} of the time), "
-            f"{_counted(self.impacts.count, 'impact')}, "
-            f"{_counted(len(self.contacts), 'contact')} ({rested / total:.0%})."
+            f"{counted(self.impacts.count, 'impact')}, "
+            f"{counted(len(self.contacts), 'contact')} ({rested / total:.0%})."
         )
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def impacts_of(found: Sequence[tuple[dict, int]]) -> Impacts:

@@ -185,9 +185,13 @@ def _without_missing(source: Source, found: dict) -> Chosen:
             f"{listed(found)}; name other columns."
         )
     first = np.flatnonzero(~whole)[0] + 1
+    place = f"row {first} (counted without the heading)"
+    what = "no number in one of the columns and"
     note = (
-        f"{source.file.name}: {lost} rows with an empty cell, the first of them row "
-        f"{first}, are omitted."
+        f"{source.file.name}: {place} has {what} is omitted."
+        if lost == 1
+        else f"{source.file.name}: {lost} rows, the first of them {place}, have {what} "
+        "are omitted."
     )
     return Chosen(
         {name: numbers[whole] for name, numbers in found.items()}, (*source.notes, note)

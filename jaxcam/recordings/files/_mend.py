@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from ...tables import counted
 from .._errors import RecordingError
 from .._recording import Recording
 from .._saturated import saturated
@@ -126,8 +127,9 @@ def _bridged(recording: Recording, bridge: int, notes) -> list[Recording]:
     if filled_total:
         share = filled_total / (filled_total + len(time))
         notes.append(
-            f"{recording.name}: {filled_total} samples ({share:.1%}) are missing; "
-            "they are interpolated to keep the sampling uniform, but no fit uses "
+            f"{recording.name}: {counted(filled_total, 'sample')} "
+            f"({100 * share:.2g} %) {'is' if filled_total == 1 else 'are'} missing; "
+            "values are interpolated to keep the sampling uniform, but no fit uses "
             "them."
         )
     for place in breaks:

@@ -72,14 +72,15 @@ class Source:
             more = f" (and in {len(bad) - 1} more rows)" if len(bad) > 1 else ""
             raise RecordingError(
                 f"{self.file}: the column {shown(name)} has {found} instead of a "
-                f"number in row {row + 1}{more}; remove those rows or the column."
+                f"number in row {row + 1} of the data{more}; remove those rows or the "
+                "column."
             )
         absurd = np.flatnonzero(np.abs(numbers) > _LARGEST_NUMBER)
         if len(absurd):
             raise RecordingError(
                 f"{self.file}: the column {shown(name)} has {numbers[absurd[0]]:.3g} "
-                f"in row {absurd[0] + 1}, which no sensor can measure; remove those "
-                f"rows or the column."
+                f"in row {absurd[0] + 1} of the data, which no sensor can measure; "
+                "remove those rows or the column."
             )
         return np.where(empty, np.nan, numbers)
 

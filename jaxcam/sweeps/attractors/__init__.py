@@ -5,6 +5,7 @@ from ._attractors import (
     Attractors as Attractors,
     find_attractors as find_attractors,
 )
+from ._drifting import drifting as drifting
 from ._fingerprint import (
     cell_codes as cell_codes,
     fingerprint_size as fingerprint_size,

@@ -19,6 +19,10 @@ counted.
 # points count as still approaching each other if the largest of their last distances is
 # less than this fraction of the largest of their first distances
 _STEADY = 0.9
+# points of one period count as different only if they are further apart than this many
+# times the tolerance: an inaccurate integration, as across an undeclared corner, makes
+# the points of a shorter orbit alternate by about the tolerance
+_DISTINCT = 10.0
 
 
 class Labels(NamedTuple):
@@ -43,7 +47,9 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
 
     A motion that spirals in towards an orbit temporarily appears to have a multiple of
     the period of the orbit. Such a motion counts as non-periodic until its points stop
-    approaching the orbit.
+    approaching the orbit. Points that differ by less than ten times the tolerance do
+    not make a period longer, because errors of the integration may have caused the
+    difference.
 
     Args:
         states: Samples, shape `(motions, keep, n)`; periods up to `keep / 2` are
@@ -74,7 +80,22 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
         left = left[found[left] == 0]
     for n in np.unique(found[found > 1]):
         (some,) = np.nonzero(found == n)
-        found[some[_still_nearing(states[some], int(n))]] = 0
+        nearing = _still_nearing(states[some], int(n))
+        found[some[nearing]] = 0
+        some = some[~nearing]
+        found[some] = _distinct_period(states[some], int(n), _DISTINCT * room[some])
+    return found
+
+
+def _distinct_period(states, n: int, room) -> np.ndarray:
+    """Return the smallest divisor of a period after which all points are as close as
+    `room`, or the period itself.
+    """
+    found = np.full(len(states), n)
+    for part in range(n - 1, 0, -1):
+        if n % part == 0:
+            apart = np.abs(states[:, part:] - states[:, :-part])
+            found[np.all(apart <= room[:, part:], axis=(1, 2))] = part
     return found
 
 

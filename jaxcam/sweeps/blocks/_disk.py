@@ -27,6 +27,7 @@ from ._checksums import (
     UNFINISHED,
     UNREADABLE,
 )
+from ._edited_code import CODE
 from ._store import ordered, plain, StoreLayout, template
 
 
@@ -116,11 +117,6 @@ class OnDisk:
             raise ValueError(
                 f"{self.path} contains something else; choose another folder"
             )
-        if not resume:
-            raise ValueError(
-                f"{self.path} already contains a sweep; pass resume=True to continue "
-                "it, or choose another folder"
-            )
         wanted = plain(self.layout.identity)
         if identity != wanted:
             differing = [
@@ -128,10 +124,18 @@ class OnDisk:
                 for key in dict.fromkeys((*identity, *wanted))
                 if identity.get(key) != wanted.get(key)
             ]
+            edited = ""
+            if {"system", CODE}.intersection(differing):
+                edited = "delete it if you edited the system, "
             raise ValueError(
                 f"{self.path} contains a different sweep (other "
-                f"{', '.join(differing)}); choose another folder, or request the same "
-                "sweep to continue it"
+                f"{', '.join(differing)}); {edited}choose another folder, or request "
+                "the same sweep to continue it"
+            )
+        if not resume:
+            raise ValueError(
+                f"{self.path} already contains a sweep; pass resume=True to continue "
+                "it, or choose another folder"
             )
         self._check_description()
 

@@ -14,6 +14,8 @@ import numpy as np
 
 from ...models.saved import system_to_json
 from ..sections import AbstractSection
+from ._edited_code import CODE, code_of_system
+from ._function_code import constant, content, DEPTH, function_code
 
 
 def about_section(section: AbstractSection) -> dict[str, Any]:
@@ -23,6 +25,9 @@ def about_section(section: AbstractSection) -> dict[str, Any]:
         value = getattr(section, field.name)
         if field.name == "system":
             found["system"] = about_system(value)
+            code = code_of_system(value)
+            if code is not None:
+                found[CODE] = code
         elif field.name not in ("regular", "impacting", "components"):
             found[field.name] = _plain(value)
     return found
@@ -36,10 +41,6 @@ def about_system(system) -> Any:
         except ValueError:
             pass
     return _plain(system)
-
-
-# how far the objects that a function uses are followed
-_DEPTH = 4
 
 
 def digest(array) -> dict[str, Any]:
@@ -63,57 +64,18 @@ def _about_function(function: Any) -> Any:
     inner = getattr(inner, "__func__", inner)
     if not isinstance(inner, types.FunctionType):
         return name
-    cells = [_content(cell) for cell in inner.__closure__ or ()]
+    cells = [content(cell) for cell in inner.__closure__ or ()]
     # the object of a bound method
     own = getattr(function, "__self__", None)
     used = [*cells, inner.__defaults__, inner.__kwdefaults__, own]
-    about = [_code(inner.__code__, _DEPTH), *(_constant(one, _DEPTH) for one in used)]
+    about = [
+        function_code(inner.__code__, DEPTH),
+        *(constant(one, DEPTH) for one in used),
+    ]
     return {
         "function": name,
         "sha256": hashlib.sha256(json.dumps(about).encode()).hexdigest(),
     }
-
-
-def _content(cell: types.CellType) -> Any:
-    """Return the variable of a cell; None if it is not assigned yet."""
-    try:
-        return cell.cell_contents
-    except ValueError:
-        return None
-
-
-def _code(code: types.CodeType, depth: int) -> list:
-    """Describe compiled code, without the names of files and the line numbers."""
-    constants = [_constant(value, depth) for value in code.co_consts]
-    return [code.co_code.hex(), constants, list(code.co_names)]
-
-
-def _constant(value: Any, depth: int) -> Any:
-    """Describe a constant of a function, or a variable that it closes over.
-
-    Objects are followed to a `depth`, because they can refer to each other.
-    """
-    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
-        return repr(value)
-    if isinstance(value, jax.Array | np.ndarray | np.generic):
-        return repr(np.asarray(value).tolist())
-    if depth == 0 or isinstance(value, type | types.ModuleType):
-        return getattr(value, "__name__", type(value).__name__)
-    if isinstance(value, types.CodeType):
-        return _code(value, depth - 1)
-    if isinstance(value, tuple | list):
-        return [_constant(one, depth - 1) for one in value]
-    if isinstance(value, dict):
-        return {str(k): _constant(one, depth - 1) for k, one in value.items()}
-    if isinstance(value, frozenset | set):
-        # their order differs between processes
-        return sorted(json.dumps(_constant(one, depth - 1)) for one in value)
-    if isinstance(value, types.FunctionType):
-        cells = [_content(cell) for cell in value.__closure__ or ()]
-        about = [_constant(one, depth - 1) for one in cells]
-        return [_code(value.__code__, depth - 1), about]
-    about = _constant(getattr(value, "__dict__", {}), depth - 1)
-    return [type(value).__name__, about]
 
 
 def _plain(value: Any) -> Any:
