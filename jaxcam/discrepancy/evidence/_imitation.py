@@ -31,7 +31,7 @@ class Beside(NamedTuple):
         **Arguments:** the `gain` of the structure in addition to the term.
         """
         allowed = policy.small * (gain + self.alone)
-        return gain > self.alone and self.beside < allowed
+        return bool(gain > self.alone and self.beside < allowed)
 
 
 def beside_structure(
