@@ -98,9 +98,16 @@ def position(time: np.ndarray, frequency: float, phase: float) -> np.ndarray:
 
 
 def write_case(
-    folder: Path, phases=(0.4, 0.4), *, column: str = "position_m", scale: float = 1.0
+    folder: Path,
+    phases=(0.4, 0.4),
+    *,
+    column: str = "position_m",
+    scale: float = 1.0,
+    offset: float = 0.0,
 ) -> Path:
-    """Write two recordings of twelve periods; `scale` multiplies the positions."""
+    """Write two recordings of twelve periods; `scale` multiplies the positions, to
+    which an `offset` (m) is added.
+    """
     rng = np.random.default_rng(3)
     folder.mkdir()
     for (name, frequency), phase in zip(FREQUENCIES.items(), phases, strict=True):
@@ -108,7 +115,7 @@ def write_case(
         seen = position(time, frequency, phase) + NOISE * rng.standard_normal(1200)
         np.savetxt(
             folder / f"{name}.csv",
-            np.stack([time, scale * seen], axis=1),
+            np.stack([time, scale * (seen + offset)], axis=1),
             delimiter=",",
             header=f"time_s,{column}",
             comments="",

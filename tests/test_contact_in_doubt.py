@@ -28,3 +28,19 @@ def test_positions_are_compared_with_the_stops(setup, tmp_path, column, scale, s
     found = setup.contact_in_doubt(setup.segments(setup.read_case(case)))
     assert bool(found) == bool(said)
     assert all(part in found for part in said), found
+
+
+@pytest.mark.parametrize("known", (True, False))
+def test_the_tolerance_of_an_offset_allows_positions_beyond_a_stop(tmp_path, known):
+    """An offset of 12 mm is a contradiction only if no offset is allowed for."""
+    rig = driven_wall.RIG
+    if not known:
+        allowed = "offset = {value = 0.0, tolerance = 0.02}\nnoise ="
+        assert rig.count("noise =") == 1
+        rig = rig.replace("noise =", allowed)
+    folder = tmp_path / "rig"
+    folder.mkdir()
+    setup = read_setup(driven_wall.write_rig(folder, rig))
+    case = driven_wall.write_case(tmp_path / "case", offset=12e-3)
+    found = setup.contact_in_doubt(setup.segments(setup.read_case(case)))
+    assert ("beyond the stop" in found) == known

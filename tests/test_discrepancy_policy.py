@@ -236,7 +236,7 @@ def test_terms_far_from_the_data_leave_time_for_functions(monkeypatch, unchecked
 
 def test_a_budget_bounds_the_search():
     """A fit that always gains, and never enough, is late after `late_attempts`."""
-    costs = [2000.0 * 0.9**k for k in range(16)]
+    costs = [900.0 * 0.9**k for k in range(16)]
     for late in (3, 8, 12):
         stop = given_up(100, Policy(late_attempts=late), beaten=100.0)
         first = next(k for k in range(1, 16) if stop(costs[:k]))

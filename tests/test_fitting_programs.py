@@ -149,6 +149,12 @@ def test_a_fit_with_a_tolerance_ends_as_close_to_the_optimum(rooms, found):
     assert -1e-6 < rough.cost - fine.cost < 1e3
 
 
+@pytest.mark.parametrize("tolerance", (0.0, -1.0, np.nan, np.inf))
+def test_a_tolerance_is_positive(rooms, tolerance):
+    with pytest.raises(ValueError, match="give a positive number"):
+        fit(rooms, tolerance=tolerance)
+
+
 @pytest.fixture(scope="module")
 def shaken():
     """A position with an error of its sensor, whose size is a parameter."""

@@ -307,16 +307,25 @@ from jaxcam import HybridSystem
 FACTOR = 1.0
 
 
+class Damper:
+    SIZE = 0.1
+
+    @staticmethod
+    def force(v):
+        return Damper.SIZE * v
+
+
 def spring(x):
     return FACTOR * x
 
 
 class Driven(HybridSystem):
     state_names = ("position", "velocity")
+    SCALE = 1.0
     omega: float = 2.0
 
     def vector_field(self, t, state):
-        push = jnp.cos(self.omega * t)
+        push = self.SCALE * jnp.cos(self.omega * t) - Damper.force(state[1])
         return jnp.stack([state[1], push - spring(state[0]) - 0.1 * state[1]])
 
     def gap(self, t, state):
@@ -338,6 +347,8 @@ class Driven(HybridSystem):
         ("FACTOR = 1.0", "FACTOR = 1.5"),
         ("FACTOR * x", "FACTOR * jnp.sin(x)"),
         ("2 * jnp.pi", "4 * jnp.pi"),
+        ("SCALE = 1.0", "SCALE = 2.0"),
+        ("SIZE = 0.1", "SIZE = 0.2"),
     ],
 )
 def test_an_edited_system_is_another_sweep(tmp_path, old, new):

@@ -87,7 +87,9 @@ def _seen_gaps(model, parameters, segments, picks) -> list[_Seen]:
                 sensor = model.sensors[picks[place]]
                 noise = row[place] * float(sensor.floor) / abs(float(sensor.gain))
                 at = partial(_contacts, here, part, states, number, place)
-                one = place, states[:, place], gaps[number], errors[number], noise, at
+                read = _reading_error(model, parameters, picks[place], states[:, place])
+                error = errors[number] + row[place] * read
+                one = place, states[:, place], gaps[number], error, noise, at
                 found.setdefault(number, []).append(one)
     names, stops = model.system.state_names, model.system.constraint_names
     seen = []
@@ -106,6 +108,20 @@ def _seen_gaps(model, parameters, segments, picks) -> list[_Seen]:
             )
         )
     return seen
+
+
+def _reading_error(model: Model, parameters, channel: str, values) -> float:
+    """Return the largest error of a measured component, of the given values, that the
+    tolerances of its sensor's offset and gain allow.
+    """
+    sensor = model.sensors[channel]
+
+    def tolerance(number) -> float:
+        found = [p.tolerance for p in parameters if p.where(model) is number]
+        return max(found, default=0.0)
+
+    per_gain = tolerance(sensor.gain) * float(np.nanmax(np.abs(values)))
+    return (tolerance(sensor.offset) + per_gain) / abs(float(sensor.gain))
 
 
 def _contacts(
@@ -145,8 +161,8 @@ def _untouched(seen: Sequence[_Seen]) -> str:
     """Describe the distance between the motion and the stops."""
     first = seen[0]
     along = [one for one in seen if one.coordinate == first.coordinate]
-    low = min(np.min(one) for one in first.positions)
-    high = max(np.max(one) for one in first.positions)
+    low = min(np.nanmin(one) for one in first.positions)
+    high = max(np.nanmax(one) for one in first.positions)
     unit = f" {first.unit}" if first.unit else ""
     ends = " and ".join(_place(one) for one in along)
     return (
@@ -163,7 +179,7 @@ def _place(one: _Seen) -> str:
     usual = float(np.median(contacts))
     # NaN, or a stop that moves, has no fixed position
     if not np.all(np.abs(contacts - usual) <= _CLOSE * (1 + abs(usual))):
-        least = min(np.min(gap) for gap in one.gaps)
+        least = min(np.nanmin(gap) for gap in one.gaps)
         to = f" to {_the(one)}" if one.name else ""
         return f"the gap{to} is at least {least:.3g}{unit}"
     return f"contact{stop} is at {usual:.4g}{unit}"
@@ -176,16 +192,16 @@ def _the(one: _Seen) -> str:
 def _beyond(one: _Seen, segments: Sequence[Segments]) -> str:
     """Describe a motion beyond a stop; empty if there is none."""
     for part, position, gap in zip(segments, one.positions, one.gaps):
-        depth = -float(np.quantile(gap, _OFTEN))
+        depth = -float(np.nanquantile(gap, _OFTEN))
         allowed = one.error + _NOISES * one.noise
-        if not depth > max(allowed, _DEEP * float(np.ptp(gap))):
+        if not depth > max(allowed, _DEEP * float(np.nanmax(gap) - np.nanmin(gap))):
             continue
-        deepest = float(position[np.argmin(gap)])
+        deepest = float(position[np.nanargmin(gap)])
         unit = f" {one.unit}" if one.unit else ""
         return (
             f"In {part.recording.name}, {one.coordinate} reaches {deepest:.3g}{unit}, "
             f"although {_place(one)}: the motion goes beyond the stop by "
-            f"{-float(np.min(gap)):.3g}, whereas the tolerances and the noise allow "
+            f"{-float(np.nanmin(gap)):.3g}, whereas the tolerances and the noise allow "
             f"{allowed:.1g}. Check {_unit_of(one)}, its sign, and the positions of the "
             "stops in the rig file."
         )

@@ -60,4 +60,8 @@ class Damping(NamedTuple):
         """
         if self.value > _LOW:
             return self
-        return self._replace(value=max(0.1 * self.value, LEAST_DAMPING))
+        states = _LOWERED * self.states
+        return self._replace(
+            value=max(0.1 * self.value, LEAST_DAMPING),
+            states=states if states > _NONE else 0.0,
+        )

@@ -64,7 +64,8 @@ def fit(
         progress: Called with the iteration number and the cost.
         tolerance: Decrease of the cost (twice the log-likelihood) below which a further
             step is not worthwhile: the iteration ends if the predicted decrease is
-            smaller.
+            smaller. With a tolerance above about 0.1, a fit that counts as converged
+            may be a noticeable fraction of the standard errors from the optimum.
 
     Returns:
         A [`jaxcam.fitting.Fit`][]. Its `converged` is true only if the fit is at an
@@ -72,7 +73,7 @@ def fit(
             standard error is finite; if not, `reasons` lists what is wrong.
 
     Raises:
-        ValueError: A name is not a parameter.
+        ValueError: A name is not a parameter, or `tolerance` is not positive.
 
     Examples:
         >>> from jaxcam import fitting, recordings
@@ -88,6 +89,10 @@ def fit(
         >>> abs(found.estimates[0].value - 9.81) < 4 * found.estimates[0].stderr
         True
     """
+    if not 0 < tolerance < math.inf:
+        raise ValueError(
+            f"`tolerance` is {tolerance}; give a positive number, such as {TOLERANCE}."
+        )
     columns = free_columns(problem, free)
     point = start_point(problem, start)
     point = inside(problem, columns, point)

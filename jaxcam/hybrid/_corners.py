@@ -142,9 +142,7 @@ def _corners_in(jaxpr, known, where) -> Iterator[tuple[str, tuple[str, int]]]:
             continue
         name = equation.primitive.name
         place = where or (None, _place(equation))
-        if _is_corner(equation, name, moves) and not _is_squared(
-            jaxpr, equation, depends
-        ):
+        if _is_corner(equation, name, moves) and not _is_squared(jaxpr, equation):
             yield place[0] or _CORNERS.get(name, "where"), place[1]
         inside = _inside(equation)
         if inside is not None and len(inside.invars) == len(moves):
@@ -168,32 +166,67 @@ def _is_corner(equation, name, moves) -> bool:
     return name in _CORNERS
 
 
-@no_type_check
-def _is_squared(jaxpr, equation, depends) -> bool:
-    """Return whether an absolute value, or a multiple of it, is used only in products
-    with its argument: `v * abs(v)` has a continuous derivative.
+# operations that only change the sign, the shape or the type of their argument
+_PASSED_ON = ("neg", "squeeze", "reshape", "broadcast_in_dim", "convert_element_type")
 
-    **Arguments:** `depends`: the results so far that depend on time or state.
+
+@no_type_check
+def _is_squared(jaxpr, equation) -> bool:
+    """Return whether an absolute value, or a multiple of it, is used only in products
+    with a multiple of its argument: `v * abs(v)` has a continuous derivative.
     """
     if equation.primitive.name != "abs":
         return False
-    argument, result = equation.invars[0], equation.outvars[0]
-    along, held, used = {id(argument)}, {id(result)}, False
+    values = _value_numbers(jaxpr)
+    along = {values[id(equation.invars[0])]}
+    held, used = {values[id(equation.outvars[0])]}, False
     for other in jaxpr.eqns:
-        places = [id(v) for v in other.invars if not isinstance(v, Literal)]
-        product, out = other.primitive.name == "mul", id(other.outvars[0])
-        if held.intersection(places):
-            if not product or held.issuperset(places) and len(places) > 1:
+        name = other.primitive.name
+        inputs = [None if isinstance(v, Literal) else v for v in other.invars]
+        parts = [values[id(v)] for v in inputs if v is not None]
+        out, factors = values[id(other.outvars[0])], parts
+        multiple = name in ("mul", "div", *_PASSED_ON)
+        if name == "div":
+            # a quotient is a multiple of its numerator only
+            above, below = inputs
+            factors = [] if above is None else [values[id(above)]]
+            if below is not None and values[id(below)] in along | held:
+                multiple = False
+        if held.intersection(parts):
+            if not multiple or not held.intersection(factors):
                 return False
-            if along.intersection(places):
+            if name == "mul" and along.intersection(parts):
                 used = True
+            elif name == "mul" and len(parts) > 1 and held.issuperset(parts):
+                return False
             else:
                 held.add(out)
-        elif product and along.intersection(places):
-            # constant multiples of the argument
-            if not depends.intersection(set(places) - along):
-                along.add(out)
-    return used and held.isdisjoint(map(id, jaxpr.outvars))
+        elif multiple and along.intersection(factors):
+            along.add(out)
+    return used and held.isdisjoint(values.get(id(v)) for v in jaxpr.outvars)
+
+
+@no_type_check
+def _value_numbers(jaxpr) -> dict[int, object]:
+    """Return a number for each variable; variables that are computed in the same way
+    from the same variables have the same number.
+    """
+    numbers, known = {}, {}
+
+    def number(key):
+        return known.setdefault(key, len(known))
+
+    for variable in (*jaxpr.invars, *jaxpr.constvars):
+        numbers[id(variable)] = number(id(variable))
+    for equation in jaxpr.eqns:
+        parts = [
+            repr(v.val) if isinstance(v, Literal) else numbers[id(v)]
+            for v in equation.invars
+        ]
+        for place, out in enumerate(equation.outvars):
+            key = equation.primitive.name, str(equation.params), (*parts,), place
+            numbers[id(out)] = number(key)
+    return numbers
 
 
 @no_type_check

@@ -67,13 +67,14 @@ def choose(
     seed: int,
     unnamed: bool = True,
     earlier: Sequence[Missing] = (),
+    loosely: bool = False,
 ) -> Choice:
     """Decide what explains the recordings: named terms, separate parameter values in
     the recordings, or unnamed functions.
 
     **Arguments:** the question, its fits, the best subset of terms, the seed, whether
     unnamed functions are sought, and `earlier` fits with functions, with which the
-    search begins.
+    search begins; `loosely`: whether these fits allowed for model errors.
     """
     policy, textbook = trials.policy, trials.known[frozenset()]
     named = supported(question, trials, found, seed)
@@ -81,7 +82,7 @@ def choose(
     functions, useless, predicted = Unnamed(), None, None
     if named.left and unnamed and policy.functions and not separate.settled:
         given = question, trials, named.best, named.left, seed
-        functions = without_a_name(*given, earlier)
+        functions = without_a_name(*given, earlier, loosely)
     rest = _within(trials, textbook, named.best.fit)
     if functions.found is not None:
         missing = functions.found

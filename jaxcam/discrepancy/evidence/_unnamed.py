@@ -51,6 +51,7 @@ def without_a_name(
     left: list[Structure],
     seed: int,
     earlier: Sequence[Missing] = (),
+    loosely: bool = False,
 ) -> Unnamed:
     """Return the functions that explain the residual of the named terms, chosen by
     their evidence.
@@ -59,7 +60,8 @@ def without_a_name(
     the part explained by a named term, and one that the smoothing of dry friction may
     leave. Functions that the bootstrap samples do not retain are dropped. If one of the
     `earlier` fits, refitted to these recordings, leaves only noise, nothing else is
-    sought.
+    sought. If these fits allowed for model errors (`loosely`), no other residual is
+    tolerated, because the right function may not be among them.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     problem = question.problem
@@ -97,7 +99,7 @@ def without_a_name(
             bool(question.model_errors),
         )
         known = refitted(search, () if elements else earlier)
-        if known is None or search.falls_short(known):
+        if known is None or search.falls_short(known, tolerated=not loosely):
             others = search.run()
             found = [one for one in (known, others) if one is not None]
             known = min(found, key=lambda one: one.score, default=None)
@@ -159,6 +161,7 @@ def _needed(
             compared = search.shuffled(found, seed)
             chance = [one for one in compared if one.by_chance]
             if not chance:
+                found = search.fits.polished(found)
                 decoys = decoys_of(search.first or (), found)
                 return found._replace(decoys=decoys, shuffled=compared), needed
             worst = max(chance, key=lambda one: one.best)

@@ -127,6 +127,17 @@ class FreeFits:
         score = self.score(subset, found)
         return Missing(functions, subset.names, found, score, subset.problem)
 
+    def polished(self, found: Missing) -> Missing:
+        """Return a fit at the optimum of its parameters, for a report."""
+        heat = heat_of(found.fit)
+        problem = heated(filled(found.problem, found.functions), heat)
+        free, most = self.free(found), self.policy.quick_iterations
+        again = fit(problem, free=free, start=found.fit.point, iterations=most)
+        if not again.cost <= found.fit.cost:
+            return found
+        subset = Subset(found.problem, found.functions, found.names)
+        return found._replace(fit=again, score=self.score(subset, again))
+
     def _stop(
         self, samples: int, heat: float, beaten: float
     ) -> Callable[[Sequence[float]], bool]:

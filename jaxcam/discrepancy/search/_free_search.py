@@ -201,11 +201,15 @@ class FreeSearch:
             least = max(least, self._small(found) / heat_of(found.fit))
         return self.need.remains(self.problem, found, least)
 
-    def falls_short(self, found: Missing | None) -> bool:
-        """Return whether nothing was found, or a residual above the noise is left."""
+    def falls_short(self, found: Missing | None, tolerated: bool = True) -> bool:
+        """Return whether nothing was found, or a residual above the noise is left.
+
+        **Arguments:** whether a part of the `tolerated` residual counts as noise.
+        """
         if found is None:
             return True
-        return not leaves_noise(self.fits, found, self._small(found))
+        small = self._small(found) if tolerated else 0.0
+        return not leaves_noise(self.fits, found, small)
 
     def _bare(self, problem: Problem, start: Point) -> Missing:
         nothing = Subset(problem, (), frozenset())
@@ -326,7 +330,9 @@ class FreeSearch:
             subset = Subset(self.apart, functions, names)
             trial = self.fits.fitted(subset, point, beaten=beaten)
             point, functions = trial.fit.point, trial.functions
-        if trial is None or problem is not self.apart and trial.fit.cost < beaten:
+        if trial is None or problem is not self.apart:
+            if trial is not None and not trial.fit.cost < beaten:
+                return None
             subset = Subset(problem, functions, names)
             trial = self.fits.fitted(subset, point, beaten=beaten)
         return trial if math.isfinite(trial.score) else None

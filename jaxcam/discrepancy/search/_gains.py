@@ -130,6 +130,20 @@ def _beside(information, score, free, new, basis):
     )
 
 
+def distinct_step(information, score, rows, alike: float) -> np.ndarray:
+    """Return the steps of some parameters to their optimum. Combinations on which the
+    data contain less than a fraction `alike` of the information on their parts do not
+    move.
+    """
+    own = np.diag(information)[rows]
+    scale = np.where(own > 0, 1 / np.sqrt(np.where(own > 0, own, 1.0)), 0.0)
+    inside = information[np.ix_(rows, rows)] * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(inside)
+    seen = values > alike
+    along = vectors[:, seen].T @ (score[rows] * scale)
+    return scale * (vectors[:, seen] @ (along / values[seen]))
+
+
 def newton_step(information, score, rows):
     """Return the steps of some parameters to their optimum, and their covariance.
 

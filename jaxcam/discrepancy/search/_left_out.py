@@ -11,7 +11,7 @@ from ..policy import Policy
 from ..terms import spelled, Term
 from ._blocks import Blocks, blocks_of, moved, values_of
 from ._free_fits import FreeFits, heat_of, Missing, Subset
-from ._gains import added_gain, gain, newton_step
+from ._gains import added_gain, distinct_step, gain
 from ._slots import emptied, filled, Part
 
 
@@ -106,7 +106,7 @@ class LeftOut:
             return None
         # the force of the term replaces that of the part left out from the start
         rows = np.union1d(without.kept, own_rows[best])
-        step, _ = newton_step(without.information, without.score, rows)
+        step = distinct_step(without.information, without.score, rows, least)
         _, point = self.subset(found, out)
         values = moved(found.problem, without.blocks, point.values, rows, step)
         return best, point._replace(values=values)
@@ -123,8 +123,7 @@ class LeftOut:
             least = allowed(found)
             if self.predicted_loss(found, one) > self.policy.clear_gain * least:
                 continue
-            most = found.score + least
-            less = self.fits.fitted(*self.subset(found, one), beaten=most)
+            less = self.fits.fitted(*self.subset(found, one))
             if less.score - found.score < least:
                 found = less
         return found

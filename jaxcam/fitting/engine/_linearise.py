@@ -32,6 +32,8 @@ from ._seen_directly import shows_directly
 # The last linearisations: a fit often begins where another ended, and the evidence for
 # a fit is assessed at its end
 _LATEST = Cache(12)
+# Largest ratio of two scales between which a linearisation is converted
+_RATIO = 1e50
 
 
 class Point(NamedTuple):
@@ -109,7 +111,7 @@ def assemble(
     # the pieces are kept, so that no other object can have their identity
     key = kinds(given), id(pieces), *(value.tobytes() for value in values)
     found = _LATEST.find(key)
-    if found is None:
+    if found is None or not _convertible(found[1], scales):
         found = pieces, scales, _linearise_all(layout, pieces, *about, scales)
         _LATEST.keep(key, found)
     _, unit, (blocks, costs) = found
@@ -130,6 +132,13 @@ def _linearise_all(layout, pieces, extras, point, columns, scales):
 
 def _shaped(leaf) -> bool:
     return hasattr(leaf, "shape")
+
+
+def _convertible(before, after) -> bool:
+    """Return whether products with both scales neither overflow nor underflow."""
+    before, after = (np.abs(np.asarray(a)[np.asarray(a) != 0]) for a in (before, after))
+    ratio = after / before
+    return bool(np.all((ratio > 1 / _RATIO) & (ratio < _RATIO)))
 
 
 def _rescaled(blocks: Blocks, before, after) -> Blocks:
