@@ -81,7 +81,8 @@ def supported(question: Question, trials: Trials, found: Trial, seed: int) -> Su
     residuals of the remaining terms.
 
     A doubtful term is named if no structure remains with it but much remains without
-    it, provided that it improves the prediction of held-out data.
+    it, provided that it explains more than an error of the form of the other terms
+    could, and that it improves the prediction of held-out data.
 
     **Arguments:** the question, its fits, the best subset of terms, and the seed.
     """
@@ -93,7 +94,10 @@ def supported(question: Question, trials: Trials, found: Trial, seed: int) -> Su
     left_before = _left(question, trials, before)
     left_after = _left(question, trials, best) if best.names else left_before
     held, needed = None, []
-    if doubtful and any(one.significant for one in left_after):
+    # a remainder may be due to the functional form of the certain terms
+    lost, gained = (one.fit.cost - found.fit.cost for one in (best, before))
+    much = lost > trials.policy.small * gained
+    if doubtful and much and any(one.significant for one in left_after):
         # some discrepancy is certain: test whether the doubtful terms explain it
         with_all = _left(question, trials, found)
         if not any(one.significant for one in with_all):

@@ -19,14 +19,14 @@ from ._missing import MissingFunction, sentence_of
 def term_effects(
     trials: Trials, choice: Choice, share: Mapping[str, float]
 ) -> list[Effect]:
-    """Return the named terms, in the order of their names.
+    """Return the named terms, the one that explains most of the misfit first.
 
     **Arguments:** `share`: the fraction of the misfit that each of them explains.
     """
     best, blocks = choice.named.best, trials.blocks(choice.named.best)
     instead = {one.term: one.lost for one in choice.named.beyond if one.term}
     found = []
-    for name in sorted(best.names):
+    for name in sorted(best.names, key=lambda name: (-share[name], name)):
         less = trials.known.get(best.names - {name}, choice.before)
         delta = best.bic - less.bic
         if name in instead:
