@@ -72,7 +72,11 @@ def test_a_force_that_a_knockoff_equals_is_not_reported(
     compared = (Shuffled("flight time", ("time",), (share, 0.2)),)
     inclusion = SimpleNamespace(inclusion={"flight time": 1.0})
     monkeypatch.setattr(_unnamed, "needs", lambda *_, **__: inclusion)
-    fits = SimpleNamespace(parts=lambda _: {"flight time": []}, prices=lambda _: {})
+    fits = SimpleNamespace(
+        parts=lambda _: {"flight time": []},
+        prices=lambda _: {},
+        polished=lambda one: one,
+    )
     search = SimpleNamespace(
         policy=Policy(), fits=fits, first=(), shuffled=lambda *_: compared
     )
