@@ -12,8 +12,8 @@ from ._options import Case, OwnSystem, Resume, RigFile
 
 
 _ONLY_CAMS = (
-    "Bifurcation speeds are predicted only for a cam-follower; for this rig, use "
-    "`jaxcam diagram --system model.json`."
+    "Bifurcation speeds are predicted only for a cam-follower; for this rig, pass the "
+    "saved model to `jaxcam diagram --system`."
 )
 
 
