@@ -1,13 +1,15 @@
 """Which functions and terms may be left out of a fit."""
 
 import types
+from typing import Any
 
 import numpy as np
 import pytest
 
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.search._blocks import _usable
+from jaxcam.discrepancy.search._blocks import _usable, moved
 from jaxcam.discrepancy.search._free_search import FreeSearch
+from jaxcam.discrepancy.search._gains import distinct_step, newton_step
 from jaxcam.discrepancy.search._left_out import LeftOut
 
 
@@ -83,3 +85,37 @@ def test_information_that_is_not_positive_is_a_numerical_error():
     score = np.ones(2)
     assert not _usable(np.array([[1.0, 2.0], [2.0, 1.0]]), score)
     assert _usable(np.array([[1.0, 0.0], [0.0, -1e-9]]), score)
+
+
+def test_a_replacement_starts_at_the_optimum_of_what_the_data_determine():
+    """A Newton step to 1e-9; along two columns that are equal to 1e-6, only their sum
+    moves.
+    """
+    rng = np.random.default_rng(0)
+    design = rng.standard_normal((50, 4)) * np.array([1.0, 1e3, 1e-3, 1.0])
+    rows, pull = np.array([0, 1, 3]), rng.standard_normal(50)
+    information, score = design.T @ design, design.T @ pull
+    wanted, _ = newton_step(information, score, rows)
+    found = distinct_step(information, score, rows, 1e-8)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9)
+
+    design[:, 3] = design[:, 0] + 1e-6 * rng.standard_normal(50)
+    information, score = design.T @ design, design.T @ pull
+    alone, _ = newton_step(information, score, rows[:2])
+    found = distinct_step(information, score, rows, 1e-8)
+    np.testing.assert_allclose(found[0] + found[2], alone[0], rtol=1e-4)
+    np.testing.assert_allclose(found[0], found[2], rtol=1e-4)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_a_step_moves_shared_values_in_all_recordings():
+    """And a value that each recording has of its own in this recording only."""
+    problem: Any = types.SimpleNamespace(names=("a", "b"))
+    blocks: Any = types.SimpleNamespace(
+        names=("a", "b", "b"),
+        owner=np.array([0, 0, 1]),
+        scale=np.array([2.0, 1.0, 3.0]),
+    )
+    values: Any = np.array([[1.0, 10.0], [1.0, 20.0]])
+    after = moved(problem, blocks, values, np.array([0, 2]), np.array([0.5, 1.0]))
+    assert np.array_equal(after, [[2.0, 10.0], [2.0, 23.0]])

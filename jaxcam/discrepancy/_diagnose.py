@@ -258,17 +258,18 @@ def _answered(
         rough = _roughly(question, bare, keep, conditions, earlier)
     if rough is not None and not rough.choice.explained(policy):
         return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
-    if rough is not None:
+    loosely = rough is not None and bool(rough.choice.functions)
+    if rough is not None and loosely:
         # their fits to connected pieces may leave only noise; they began with those of
         # the answer before
-        earlier = rough.choice.functions or earlier
+        earlier = rough.choice.functions
     if rough is not None and rough.choice.named.best.names:
         # the physics was found, so that the stated noise can be used
         found = rough.choice.named.best
         again = _again(trials, found.names, found.fit)
         if again is not None and again.bic < best.bic:
             best = search.refined(again)
-    choice = choose(question, trials, best, seed, not odd, earlier, rough is not None)
+    choice = choose(question, trials, best, seed, not odd, earlier, loosely)
     if rough is not None and rough.finds and not choice.explained(policy):
         return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
     found = diagnosis_of(case, question, trials, choice, ripple)
