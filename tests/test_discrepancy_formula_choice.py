@@ -21,7 +21,9 @@ def _trial(score, cost=1000.0):
     samples = types.SimpleNamespace(samples=1000)
     one = types.SimpleNamespace(slot="force_a", smooth=True, coefficients="abc")
     found = _Fit(cost, samples)
-    return types.SimpleNamespace(score=score, functions=(one,), fit=found)
+    return types.SimpleNamespace(
+        score=score, functions=(one,), fit=found, problem=None
+    )
 
 
 @pytest.fixture
@@ -42,7 +44,7 @@ def chosen(monkeypatch, unchecked_types):
                 if gain
             ]
 
-        def fitted(fits, found, apart, one, start, small):
+        def fitted(fits, found, apart, one, start, small, first=None):
             _, primitive, numbers = start
             tried.append(primitive.name)
             if primitive.special is None and numbers is not None:

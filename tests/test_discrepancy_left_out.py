@@ -56,7 +56,7 @@ def test_a_function_that_explains_much_is_not_fitted_without(
     allowed for `a`; `b` is not needed."""
     tried = []
 
-    def fitted(subset, point):
+    def fitted(subset, point, beaten):
         tried.append(subset)
         return _found(["a"], 1010.0)
 

@@ -10,13 +10,14 @@ import math
 import numpy as np
 
 from ...fitting import Problem
+from ...fitting.engine import Point
 from ._clock import Clock
 from ._curve_likelihood import CurveLikelihood, promising, Start
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._hidden_state import Hidden
 from ._leads import shows_apart
 from ._roughness import Roughness
-from ._slots import emptied, Free, replaced
+from ._slots import emptied, Free, Part, replaced
 from ._sums_of_forms import SumSearch
 
 
@@ -38,7 +39,7 @@ def formulated(
             continue
         likelihood = CurveLikelihood.about(fits, found, one)
         trials = _Trials(fits, found, apart, one, small, progress, clock)
-        trials.run(promising(likelihood, fits.policy.followed))
+        trials.run(trials.compared(promising(likelihood, fits.policy.followed)))
         if trials.kept is None and not trials.close:
             search = SumSearch(likelihood, fits.policy.small)
             sums = search.promising(fits.policy.followed)
@@ -68,6 +69,8 @@ class _Trials:
         self.fits, self.found, self.apart = fits, found, apart
         self.one, self.small, self.progress = one, small, progress
         self.sound: list[Missing] = []
+        # fits to disconnected pieces from which those to whole recordings start
+        self.on_pieces: dict[str, Missing | None] = {}
 
     @property
     def kept(self) -> Missing | None:
@@ -83,6 +86,33 @@ class _Trials:
         """Return whether a form explains almost as much as the function."""
         allowed = self.found.fit.cost + self.small
         return any(trial.fit.cost < allowed for trial in self.sound)
+
+    def compared(self, starts: list[Start]) -> list[Start]:
+        """Return the forms in the order of their evidence on disconnected pieces.
+
+        If a function leaves more than noise, the gains predicted from it are not
+        reliable. A form whose cost on disconnected pieces is a multiple of the least
+        one is then left out.
+        """
+        policy, found = self.fits.policy, self.found
+        alone = self.apart is found.problem or not shows_apart(self.one.family)
+        if alone or len(starts) < 2 or leaves_noise(self.fits, found):
+            return starts
+        for start in starts:
+            if self.clock.over:
+                return starts
+            self.progress(f"fitting a formula: {start.primitive.name}", None)
+            self.on_pieces[start.primitive.name] = _on_pieces(
+                self.fits, found, self.apart, self.one, start, self.small
+            )
+        fits = [(start, self.on_pieces[start.primitive.name]) for start in starts]
+        sound = [(start, fit) for start, fit in fits if fit and _sound(fit, self.one)]
+        least = min((fit.fit.cost for _, fit in sound), default=math.inf)
+        return [
+            start._replace(gain=-fit.score)
+            for start, fit in sorted(sound, key=lambda pair: pair[1].score)
+            if fit.fit.cost <= policy.hopeless_cost * least
+        ]
 
     def run(self, waiting: list[Start]) -> None:
         """Fit forms in turn, until the next one is unlikely to have more evidence.
@@ -100,8 +130,9 @@ class _Trials:
                 continue
             done.add(form.name)
             self.progress(f"fitting a formula: {form.name}", None)
+            first = self.on_pieces.get(form.name)
             trial = _fitted(
-                self.fits, self.found, self.apart, self.one, start, self.small
+                self.fits, self.found, self.apart, self.one, start, self.small, first
             )
             if trial is None or not _sound(trial, self.one):
                 continue
@@ -150,17 +181,11 @@ def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     )
 
 
-def _fitted(
-    fits: FreeFits,
-    found: Missing,
-    apart: Problem,
-    one: Free,
-    start: Start,
-    small: float,
-) -> Missing | None:
-    """Fit a form in place of a function.
-
-    **Returns:** the fit, or `None` if the form explains much less than the function.
+def _in_place(
+    found: Missing, one: Free, start: Start
+) -> tuple[tuple[Part, ...], Point]:
+    """Return the functions of a fit with a form in place of one of them, and a start
+    for their fit.
     """
     problem, numbers = found.problem, start.numbers
     size = Roughness(size=abs(float(numbers[0])))
@@ -169,15 +194,55 @@ def _fitted(
     values = emptied(problem, found.fit.point.values, one.slot)
     columns = [problem.names.index(name) for name in form.coefficients]
     values = replaced(values, columns, numbers)
-    point = found.fit.point._replace(values=values)
-    beaten = max(fits.policy.form_cost * found.fit.cost, found.fit.cost + small)
-    if apart is not problem and shows_apart(one.family):
-        # with disconnected pieces, the fit is an almost linear problem
-        subset = Subset(apart, functions, found.names)
-        first = fits.fitted(subset, point, beaten=beaten)
-        if not first.fit.cost < beaten:
+    return functions, found.fit.point._replace(values=values)
+
+
+def _beaten(fits: FreeFits, found: Missing, small: float) -> float:
+    """Return the cost below which a form explains about as much as the function."""
+    return max(fits.policy.form_cost * found.fit.cost, found.fit.cost + small)
+
+
+def _on_pieces(
+    fits: FreeFits,
+    found: Missing,
+    apart: Problem,
+    one: Free,
+    start: Start,
+    small: float,
+) -> Missing | None:
+    """Fit a form in place of a function to disconnected pieces: an almost linear
+    problem.
+
+    **Returns:** the fit, or `None` if the form explains much less than the function.
+    """
+    functions, point = _in_place(found, one, start)
+    beaten = _beaten(fits, found, small)
+    first = fits.fitted(Subset(apart, functions, found.names), point, beaten=beaten)
+    return first if first.fit.cost < beaten else None
+
+
+def _fitted(
+    fits: FreeFits,
+    found: Missing,
+    apart: Problem,
+    one: Free,
+    start: Start,
+    small: float,
+    first: Missing | None = None,
+) -> Missing | None:
+    """Fit a form in place of a function to whole recordings.
+
+    **Arguments:** `first`: its fit to disconnected pieces, if there is one already.
+
+    **Returns:** the fit, or `None` if the form explains much less than the function.
+    """
+    functions, point = _in_place(found, one, start)
+    if apart is not found.problem and shows_apart(one.family):
+        first = first or _on_pieces(fits, found, apart, one, start, small)
+        if first is None:
             return None
         point, functions = first.fit.point, first.functions
-    subset = Subset(problem, functions, found.names)
+    subset = Subset(found.problem, functions, found.names)
+    beaten = _beaten(fits, found, small)
     trial = fits.fitted(subset, point, beaten=beaten)
     return trial if trial.fit.cost < beaten else None

@@ -123,7 +123,8 @@ class LeftOut:
             least = allowed(found)
             if self.predicted_loss(found, one) > self.policy.clear_gain * least:
                 continue
-            less = self.fits.fitted(*self.subset(found, one))
+            subset, point = self.subset(found, one)
+            less = self.fits.fitted(subset, point, beaten=found.score + least)
             if less.score - found.score < least:
                 found = less
         return found
