@@ -9,7 +9,7 @@ import pytest
 from jaxcam import fitting
 from jaxcam.data import NEW_RIG
 from jaxcam.discrepancy import Policy
-from jaxcam.discrepancy.search import setup_question
+from jaxcam.discrepancy.search import segmented, setup_question
 from jaxcam.fitting import Sensor, without_lags
 from jaxcam.models import ImpactOscillator
 from jaxcam.recordings import Recording, RecordingError, RigError
@@ -108,7 +108,11 @@ def test_the_stated_calibration_reaches_the_sensor(setup, setup_file):
 def test_a_calibration_that_the_rig_fits_is_no_missing_effect(setup):
     """Otherwise two parameters would be the same number of the model."""
     runs = (recorded(1), recorded(2))
-    question = setup_question(setup, runs, None, lambda *said: None, Policy(), {})
+
+    def said(*words):
+        pass
+
+    question = setup_question(*segmented(setup, runs, said, {}), None, said, Policy())
     offered = {term.name for term in (*question.terms, *question.unlisted)}
     assert offered.isdisjoint({"sensor_lag", "sensor_gain"})
     assert "sensor_offset" in offered

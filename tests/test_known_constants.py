@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxcam.discrepancy.policy import Policy
-from jaxcam.discrepancy.search import setup_question
+from jaxcam.discrepancy.search import segmented, setup_question
 from jaxcam.fitting import fit, Parameter, Problem, read_setup, train
 from jaxcam.recordings import Recording, RecordingError, RigError
 
@@ -139,9 +139,12 @@ def test_a_record_that_says_nothing_has_the_value_of_the_rig(tmp_path):
 def test_a_diagnosis_knows_it_too(tmp_path):
     """The terms that could be missing are fitted beside the same constants."""
     setup = setup_of(tmp_path)
-    question = setup_question(
-        setup, recorded(), None, lambda words, share: None, Policy(), {}
-    )
+
+    def said(words, share):
+        pass
+
+    parts = segmented(setup, recorded(), said, {})
+    question = setup_question(*parts, None, said, Policy())
     assert question.rig == ("stiffness", "damping", "force")
     problem = question.problem
     places = [problem.names.index(name) for name in ("mass", "speed")]

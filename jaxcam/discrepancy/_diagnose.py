@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import shutil
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -28,6 +28,7 @@ from .search import (
     Report,
     rig_question,
     Search,
+    segmented,
     setup_question,
     starting_at,
     system_question,
@@ -171,6 +172,22 @@ class _Rig:
     sensors: Mapping[str, Sensor] | None
     parameters: Sequence[Parameter]
     drive: Turning | Input | None
+    # segments that were found, which do not depend on the location
+    _cut: dict[Hashable, tuple[Setup, tuple[Segments, ...]]] = dataclasses.field(
+        default_factory=dict
+    )
+
+    def _segmented(
+        self,
+        setup: Setup,
+        recordings: Sequence[Recording | Segments],
+        lags: Mapping[str, float],
+        report: Report,
+    ) -> tuple[Setup, tuple[Segments, ...]]:
+        key = tuple(map(id, recordings)), tuple(lags.items())
+        if key not in self._cut:
+            self._cut[key] = segmented(setup, recordings, report, lags)
+        return self._cut[key]
 
     def question(
         self,
@@ -187,7 +204,8 @@ class _Rig:
         if isinstance(system, Rig):
             return rig_question(system, *offered, *asked, lags)
         if isinstance(system, Setup):
-            return setup_question(system, *offered, *asked, lags, location)
+            parts = self._segmented(system, recordings, lags, conditions.report)
+            return setup_question(*parts, self.candidates, *asked, location)
         return system_question(
             system,
             tuple(recordings),  # pyright: ignore

@@ -44,6 +44,7 @@ from ._search import Search as Search
 from ._shuffled import Shuffled as Shuffled
 from ._slots import Free as Free, free_term as free_term
 from ._system_question import (
+    segmented as segmented,
     setup_question as setup_question,
     system_question as system_question,
 )

@@ -50,17 +50,14 @@ from ._question import (
 _RESOLVED = 0.3
 
 
-def setup_question(
+def segmented(
     setup: Setup,
     recordings: Sequence[Recording | Segments],
-    candidates: Candidates,
     report: Report,
-    policy: Policy,
     lags: Mapping[str, float],
-    location: Location = Location(),
-) -> Question:
-    """Return the question of a diagnosis for an arbitrary system, given by a setup with
-    its sensors and tolerances; `lags` (s) of channels replace those of their sensors.
+) -> tuple[Setup, tuple[Segments, ...]]:
+    """Return the segments of recordings, without long lags, and their setup; `lags` (s)
+    of channels replace those of their sensors. Existing segments are kept.
 
     **Raises:** `RecordingError` if the recordings cannot be those of the rig.
     """
@@ -70,7 +67,21 @@ def setup_question(
         check_channels(run.recording if isinstance(run, Segments) else run)
     report("finding impacts and contacts", None)
     setup, runs = setup.without_lags(runs, lags)
-    model, segments = setup.model, setup.segments(runs)
+    return setup, setup.segments(runs)
+
+
+def setup_question(
+    setup: Setup,
+    segments: Sequence[Segments],
+    candidates: Candidates,
+    report: Report,
+    policy: Policy,
+    location: Location = Location(),
+) -> Question:
+    """Return the question of a diagnosis for an arbitrary system, given by a setup with
+    its sensors and tolerances.
+    """
+    model = setup.model
     question = system_question(
         model.system,
         segments,
