@@ -174,6 +174,16 @@ def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> Chatter
     Returns:
         A [`variational.chatter.ChatterFrame`][] of derivatives, in the units of the
             frame divided by that of the parameter.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.chatter import parameter_incidence
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> rates = parameter_incidence(system, "omega")
+        >>> round(float(rates.release), 6)  # release is at pi / (2 omega)
+        -6.283185
+        >>> round(float(rates.jerk), 6)  # the jerk is omega
+        1.0
     """
     system = as_arrays(system)
     along = unit_tangent(where, system)

@@ -84,6 +84,19 @@ def find_lobes(
 
     Raises:
         ValueError: Fewer than two lobes are found.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import find_lobes, scaling_law
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> state = jnp.array([-0.1041427, -0.2869127])  # on the sticking orbit
+        >>> sides = np.linspace(-1e-3, 1e-3, 32)
+        >>> lobes = find_lobes(system, state, sides, phase=0.35, samples=16, most=3)
+        >>> widths = np.abs(np.diff(lobes.corners))
+        >>> (widths[1:] / widths[:-1]).round(3).tolist()
+        [0.502, 0.502]
+        >>> round(float(scaling_law(0.5).q), 3)  # the limit of these ratios
+        0.503
     """
     check_chatter_system(system)
     system = as_arrays(system)

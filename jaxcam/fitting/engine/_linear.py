@@ -101,6 +101,8 @@ def linear_pieces(
 ) -> LinearPieces:
     """Linearise one recording about its states.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         model_at: `model_at(change, start, step)` is the model of a piece that begins at
             `start` with steps of length `step`, where `change` `(m,)` is the change of
@@ -114,6 +116,17 @@ def linear_pieces(
 
     Returns:
         A [`jaxcam.fitting.engine.LinearPieces`][].
+
+    Examples:
+        >>> from jaxcam.fitting.engine import linear_pieces
+        >>> first = lambda tree: jax.tree.map(lambda leaf: leaf[0], tree)
+        >>> values, states = first(found.point)
+        >>> model_at = lambda change, start, step: problem.layout.at(values + change)
+        >>> record = first(problem.pieces), first(problem.extras), states
+        >>> made = jax.jit(lambda: linear_pieces(model_at, *record, 1, False))()
+        >>> cost = jnp.sum(made.flown_cost) + jnp.sum(made.joint_cost)
+        >>> round(float(cost / found.cost), 3)
+        1.0
     """
     size, origin = states.shape[-1], jnp.zeros(width)
     found = _linear_flights(model_at, pieces, extras, states, origin, shown)

@@ -279,6 +279,13 @@ def cam_follower_drive() -> Turning:
 
     Returns:
         A [`jaxcam.fitting.Turning`][].
+
+    Examples:
+        >>> from jaxcam.fitting.engine import cam_follower_drive
+        >>> from jaxcam.models import preset
+        >>> rig, drive = preset("calibrated"), cam_follower_drive()
+        >>> round(float(drive.speed(rig)) * 30 / np.pi, 1)  # rpm
+        145.0
     """
     return _CAM_DRIVE
 

@@ -104,6 +104,15 @@ def compare_case(
 
     Raises:
         RecordingError: A recording was segmented without its drive.
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.recordings import read_case, read_rig, segment_case
+        >>> from jaxcam.recordings.against_model import compare_case
+        >>> rig = read_rig(DEMO_RIG / "rig.toml")
+        >>> found = compare_case(rig, segment_case(read_case(DEMO_RIG), rig)[:1])
+        >>> [(row.mode, f"{row.ratio:.0f}") for row in found.rows[:2]]  # rms / noise
+        [('flight', '2'), ('contact', '24')]
     """
     found = []
     for segments in case:

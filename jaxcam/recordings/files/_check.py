@@ -67,6 +67,16 @@ def check_channels(recording: Recording) -> None:
 
     Raises:
         RecordingError: A channel is constant, or an angle appears to be in degrees.
+
+    Examples:
+        >>> from jaxcam.recordings import Recording, RecordingError
+        >>> from jaxcam.recordings.files import check_channels
+        >>> stuck = Recording("run", 0.1 * np.arange(5), {"angle_rad": np.full(5, 0.3)})
+        >>> try:
+        ...     check_channels(stuck)
+        ... except RecordingError as error:
+        ...     print(str(error).partition(";")[0])
+        run: the channel `angle_rad` is 0.3 throughout
     """
     for name, samples in recording.channels.items():
         # A force or a reference may be constant, but the motion itself may not
@@ -94,6 +104,17 @@ def check_drive(recording: Recording) -> None:
     Raises:
         RecordingError: The speeds differ; the message names the unit suggested by the
             numbers.
+
+    Examples:
+        >>> from jaxcam.recordings import Recording, RecordingError
+        >>> from jaxcam.recordings.files import check_drive
+        >>> time = 1e-3 * np.arange(1000)
+        >>> degrees = {"cam_angle_rad": 573.0 * time}  # 573 degrees/s are 10 rad/s
+        >>> try:
+        ...     check_drive(Recording("run", time, degrees, nominal_speed=10.0))
+        ... except RecordingError as error:
+        ...     print(str(error).partition(";")[0])
+        run: `cam_angle_rad` looks like degrees
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed
