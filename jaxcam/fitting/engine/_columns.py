@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ._eliminate import eliminate_states, LEAST
-from ._linear import Extras
+from ._extras import Extras
 from ._linearise import assemble, Blocks, Costs, Point
 from ._parameter import Parameter
 from ._problem import Problem

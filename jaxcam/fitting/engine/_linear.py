@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._extras import Extras, Sharpness
 from ._fly import flight_with_substeps, fly_about
 from ._likelihood import score_all
 from ._model import Model
@@ -23,35 +24,6 @@ from ._predict import (
     samples,
 )
 from ._through_nodes import normal_through, shares_of
-
-
-class Sharpness(NamedTuple):
-    """Standard errors of the joints of one recording, and of the state of a typical
-    piece.
-
-    Multiplied by the factor `apart`, the errors of the joints are so large that each
-    piece is fitted separately.
-    """
-
-    flight: Float[Array, "k n"]
-    impact: Float[Array, "k n"]
-    gap: Float[Array, " k"]
-    piece: Float[Array, "k n"]
-    apart: Float[Array, ""]
-
-
-class Extras(NamedTuple):
-    """Further arguments of a compiled program: reference states in contact and the
-    errors of the joints.
-
-    `weight` `(r, k)` and `rest_weight` `(r, kc)` are the weights of the data of each
-    piece.
-    """
-
-    guess: Float[Array, "r kc n"]
-    sharpness: Sharpness
-    weight: Float[Array, "r k"]
-    rest_weight: Float[Array, "r kc"]
 
 
 class LinearPieces(NamedTuple):

@@ -11,11 +11,11 @@ from jaxtyping import Array, Float, Int
 from ...hybrid.caches import Cache
 from ...hybrid.programs import program
 from ._each_record import each_record, kinds, of_record
+from ._extras import Extras
 from ._fly import fly, fly_without_derivatives
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
-    Extras,
     flight_inputs,
     flown,
     joint,

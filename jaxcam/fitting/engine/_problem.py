@@ -56,9 +56,9 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from ...recordings import RecordingError, Segments
+from ._extras import Extras
 from ._known_constants import known_constants
 from ._layout import Layout, strongly_typed
-from ._linear import Extras
 from ._linearise import Point
 from ._model import Input, Model
 from ._own_states import own_states
