@@ -83,7 +83,9 @@ def find_lobes(
         The [`variational.chatter.Lobes`][].
 
     Raises:
-        ValueError: Fewer than two lobes are found.
+        ValueError: Fewer than two lobes are found, chatter is complete for all
+            deviations or for none, `direction` does not change `component`, or the
+            system has no period.
 
     Examples:
         >>> from jaxcam.models import ImpactOscillator

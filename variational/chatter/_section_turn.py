@@ -185,6 +185,9 @@ def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
             times are in the period that starts at the release of `chatter_frame(system,
             time)`; `found` is false from the first flight that does not return.
 
+    Raises:
+        ValueError: The system has no period.
+
     Examples:
         >>> from jaxcam.models import ImpactOscillator
         >>> from variational.chatter import release_impacts
@@ -249,6 +252,9 @@ def section_to_impact(system: HybridSystem, state, phase, rank) -> ImpactPoint:
 
     Returns:
         An [`variational.chatter.ImpactPoint`][].
+
+    Raises:
+        ValueError: The system has no period.
 
     Examples:
         >>> from jaxcam.models import BouncingBall

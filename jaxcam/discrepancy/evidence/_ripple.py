@@ -61,6 +61,7 @@ class Ripple:
 
     @property
     def delta_bic(self) -> float:
+        """BIC with the ripple minus BIC without it."""
         return 2 * math.log(max(self.count, 2)) - self.gain
 
 

@@ -44,6 +44,7 @@ class Columns:
 
     @property
     def scales(self) -> Float[np.ndarray, "r m"]:
+        """Scale of each column of `local`, zero for padding, shape `(r, m)`."""
         padded = np.append(self.scale, 0.0)
         return padded[self.place]
 

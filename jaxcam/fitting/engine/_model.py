@@ -93,6 +93,7 @@ class Sensor(eqx.Module):
 
     @property
     def filtered(self) -> bool:
+        """Whether the sensor has a limited bandwidth."""
         return self.bandwidth_hz != float("inf")
 
     @property
