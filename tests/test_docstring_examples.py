@@ -101,6 +101,13 @@ def _names() -> list[str]:
 DEFINED = {name: _definition(name) for name in _names()}
 FUNCTIONS = {k: v for k, v in DEFINED.items() if isinstance(v, ast.FunctionDef)}
 CLASSES = {k: v for k, v in DEFINED.items() if isinstance(v, ast.ClassDef)}
+METHODS = {
+    f"{name}.{node.name}": node
+    for name, cls in CLASSES.items()
+    for node in cls.body
+    if isinstance(node, ast.FunctionDef)
+}
+DOCUMENTED = {**FUNCTIONS, **CLASSES, **METHODS}
 PACKAGES = (
     "jaxcam",
     "variational",
@@ -209,13 +216,13 @@ def test_the_example_of_a_slow_function_is_in_the_guide_that_it_names(name, guid
     assert code.search((ROOT / "docs" / guide).read_text("utf-8"))
 
 
-EXAMPLES = [name for name in {**FUNCTIONS, **CLASSES} if ">>> " in _doc(DEFINED[name])]
+EXAMPLES = [name for name, node in DOCUMENTED.items() if ">>> " in _doc(node)]
 
 
 def _run(name: str, names: dict) -> dict:
     """Run the example of a name among `names`, and return what it has defined."""
     test = doctest.DocTestParser().get_doctest(
-        _doc(DEFINED[name]), names, name, None, 0
+        _doc(DOCUMENTED[name]), names, name, None, 0
     )
     shown = io.StringIO()
     done = doctest.DocTestRunner(verbose=False).run(
@@ -228,7 +235,7 @@ def _run(name: str, names: dict) -> dict:
 def _given(name: str) -> dict:
     """What an example may use: also what the one that it continues has defined."""
     told = r"example\s+continues\s+the\s+one\s+in\s+\[`([\w.]+)`\]"
-    continued = re.search(told, _doc(DEFINED[name]))
+    continued = re.search(told, _doc(DOCUMENTED[name]))
     return {**GIVEN, **(_defined_by(continued[1]) if continued else {})}
 
 

@@ -203,7 +203,9 @@ def test_other_units_than_the_name_says(tmp_path):
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
 @pytest.mark.parametrize("wraps", [False, True])
 @pytest.mark.parametrize(("unit", "turn"), [("degrees", 360.0), ("turns", 1.0)])
-def test_an_angle_in_another_unit_that_jumps_at_each_revolution(rate, wraps, unit, turn):
+def test_an_angle_in_another_unit_that_jumps_at_each_revolution(
+    rate, wraps, unit, turn
+):
     """10 rad/s; at 100 Hz a step of 5.7 degrees is more than half a turn in rad."""
     turned = 10.0 / (2 * np.pi) * np.arange(0.0, 2.0, 1 / rate)
     angle = turn * (turned % 1 if wraps else turned)

@@ -51,6 +51,14 @@ class ChatterFrame(eqx.Module):
 
         Returns:
             Lambda, dimensionless, in the broadcast shape.
+
+        Examples:
+            >>> from jaxcam.models import ImpactOscillator
+            >>> from variational import chatter_frame
+            >>> frame = chatter_frame(ImpactOscillator(omega=0.5, restitution=0.5))
+            >>> lam = frame.coordinate(frame.release - 2.0, speed=0.1)
+            >>> round(float(lam), 6)  # v / (c tau^2) with c = omega
+            0.05
         """
         tau = time - self.release
         return speed / (self.jerk * tau * tau)

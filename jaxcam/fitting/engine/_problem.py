@@ -289,6 +289,13 @@ class Problem:
     def between(self, start: ArrayLike, stop: ArrayLike) -> Weights:
         """Return weights that count only the pieces of each recording that begin in a
         time span (s); the span may differ between recordings, `(records,)`.
+
+        The example continues the one in [`jaxcam.fitting.fit`][].
+
+        Examples:
+            >>> half = fitting.fit(problem, weights=problem.between(0.0, 0.5))
+            >>> half.estimates[0].stderr > found.estimates[0].stderr
+            True
         """
         low, high = (np.expand_dims(np.asarray(t), -1) for t in (start, stop))
 
