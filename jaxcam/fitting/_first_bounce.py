@@ -29,6 +29,8 @@ def first_bounce(
     trajectories, this method uses one number per period: the maximum of several noisy
     samples.
 
+    The example continues the one in [`jaxcam.recordings.segment_case`][].
+
     Args:
         system: The system.
         segments: A segmented recording.
@@ -41,13 +43,9 @@ def first_bounce(
         RecordingError: The recording has no measured drive.
 
     Examples:
-        >>> from jaxcam.data import DEMO_RIG
         >>> from jaxcam.fitting import first_bounce
         >>> from jaxcam.fitting.engine import cam_follower_drive
-        >>> from jaxcam.recordings import read_case, read_rig, segment_case
-        >>> rig = read_rig(DEMO_RIG / "rig.toml")
-        >>> parts = segment_case(read_case(DEMO_RIG), rig)
-        >>> system = rig.system(parts[1].drive.speed)
+        >>> system = read_rig(DEMO_RIG / "rig.toml").system(parts[1].drive.speed)
         >>> found = first_bounce(system, parts[1], cam_follower_drive())
         >>> len(found), round(float(np.median(found)), 2)
         (9, 0.56)

@@ -116,7 +116,8 @@ def solve_lcp(
 
     Examples:
         >>> from jaxcam.timestepping.complementarity import solve_lcp
-        >>> z = solve_lcp([[2.0, 1.0], [1.0, 2.0]], [-5.0, 1.0])
+        >>> matrix = jnp.array([[2.0, 1.0], [1.0, 2.0]])
+        >>> z = solve_lcp(matrix, jnp.array([-5.0, 1.0]))
         >>> np.asarray(z).round(6).tolist()  # w = (0, 3.5)
         [2.5, 0.0]
     """

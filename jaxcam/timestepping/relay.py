@@ -105,7 +105,8 @@ def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
 
     Examples:
         >>> from jaxcam.timestepping.relay import is_p_matrix
-        >>> is_p_matrix([[1.0, 2.0], [0.0, 1.0]]), is_p_matrix([[1.0, 2.0], [2.0, 1.0]])
+        >>> triangular = jnp.array([[1.0, 2.0], [0.0, 1.0]])
+        >>> is_p_matrix(triangular), is_p_matrix(triangular + triangular.T)
         (True, False)
     """
     values = np.asarray(matrix)

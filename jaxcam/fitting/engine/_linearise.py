@@ -110,7 +110,8 @@ def assemble(
         >>> from jaxcam.fitting.engine import assemble, free_columns
         >>> columns = free_columns(problem, None)
         >>> given = problem.layout, problem.pieces, problem.extras, found.point
-        >>> blocks, costs = assemble(*given, columns.local, columns.scales)
+        >>> free = jnp.asarray(columns.local), jnp.asarray(columns.scales)
+        >>> blocks, costs = assemble(*given, *free)
         >>> round(float(np.sum(costs.flown)) / len(run), 2)  # per sample
         1.0
     """

@@ -66,9 +66,9 @@ def fit_free_fall(
         >>> from jaxcam.fitting.published import fit_free_fall
         >>> from jaxcam.models import BouncingBall
         >>> times = np.linspace(0.0, 0.4, 9)
-        >>> height, error = (1 - 4.905 * times**2).round(3), 3e-4
+        >>> height, start = (1 - 4.905 * times**2).round(3), np.array([0.9, 0.0])
         >>> ball, gravity = BouncingBall(gravity=9.0), lambda ball: ball.gravity
-        >>> fit = fit_free_fall(ball, gravity, times, height, error, state=[0.9, 0.0])
+        >>> fit = fit_free_fall(ball, gravity, times, height, 3e-4, state=start)
         >>> fit.estimates.round(2).tolist()  # gravity, height and velocity
         [9.82, 1.0, 0.0]
     """

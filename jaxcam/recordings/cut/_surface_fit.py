@@ -56,6 +56,8 @@ def fit_surface(
     keep each parameter near its nominal value. The result is accurate enough to segment
     the recordings; `refine_surface` improves it to the accuracy of the data.
 
+    The example continues the one in [`jaxcam.recordings.segment_case`][].
+
     Args:
         recordings: The recordings.
         rig: The rig.
@@ -66,8 +68,6 @@ def fit_surface(
         A [`jaxcam.recordings.cut.Surface`][].
 
     Examples:
-        >>> from jaxcam.data import DEMO_RIG
-        >>> from jaxcam.recordings import read_case, read_rig
         >>> from jaxcam.recordings.cut import fit_surface, nominal_surface
         >>> rig, case = read_rig(DEMO_RIG / "rig.toml"), read_case(DEMO_RIG)
         >>> fitted, turned = fit_surface(case.recordings, rig), np.linspace(1.0, 3.5, 9)
@@ -116,9 +116,8 @@ def refine_surface(surface: Surface, rig: Rig, segments: Sequence) -> Surface:
         A [`jaxcam.recordings.cut.Surface`][].
 
     Examples:
-        >>> from jaxcam.recordings import segment_case
         >>> from jaxcam.recordings.cut import refine_surface
-        >>> refined = refine_surface(fitted, rig, segment_case(case, rig))
+        >>> refined = refine_surface(fitted, rig, parts)
         >>> turned = np.linspace(0.0, 6.2, 32)  # also where the cam is rarely touched
         >>> change = refined.angle(turned) - nominal_surface(rig).angle(turned)
         >>> round(1e3 * float(np.max(np.abs(change))), 1)  # mrad

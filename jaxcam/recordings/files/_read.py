@@ -35,7 +35,7 @@ def read_recordings(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> tuple[Recording, ...]:
-    """Read every recording in one file.
+    r"""Read every recording in one file.
 
     The file is text (plain or gzip-compressed), `.mat`, `.xlsx` or `.parquet`.
     Column names end with the unit. Columns in `_deg`, `_rpm`, `_ms`, `_mm` and similar
