@@ -104,14 +104,7 @@ def find_lobes(
     system = as_arrays(system)
     state = jnp.asarray(state, jnp.float64)
     base = float(state[component])
-    axis = jnp.zeros(2).at[component].set(1.0)
-    along = axis if direction is None else jnp.asarray(direction, jnp.float64)
-    if float(along[component]) == 0:
-        raise ValueError(
-            f"direction is {np.asarray(along)}: it does not change component "
-            f"{component}. Give another component or direction."
-        )
-    along = along / along[component]
+    along = _along(direction, component)
     scan = base + np.asarray(deviations, dtype=float)
     # number of rows for the scan, the brackets, the points of the lobes, and three
     # calls with one row each
@@ -153,6 +146,18 @@ def find_lobes(
         scanned=scanned,
         impacts=impacts,
     )
+
+
+def _along(direction, component: int):
+    """Return the direction, scaled so that `component` changes by one."""
+    axis = jnp.zeros(2).at[component].set(1.0)
+    along = axis if direction is None else jnp.asarray(direction, jnp.float64)
+    if float(along[component]) == 0:
+        raise ValueError(
+            f"direction is {np.asarray(along)}: it does not change component "
+            f"{component}. Give another component or direction."
+        )
+    return along / along[component]
 
 
 def _rows(states: int) -> int:
