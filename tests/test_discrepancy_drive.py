@@ -41,6 +41,7 @@ def test_a_ripple_is_measured():
     assert found.psi == pytest.approx(psi, abs=4 * found.psi_stderr)
     assert found.delta_bic < -1000
     assert found.inclusion == 1.0
+    assert type(found.psi_stderr) is float
 
 
 def test_wandering_is_no_ripple():

@@ -1,8 +1,9 @@
 """The pages of the API are complete, and the examples on them run.
 
 Every name on a page of `docs/api` is checked: a function describes each argument and
-its result, a class each of its fields, and a method begins by what it returns. Names
-that a package exports have an example, in the form of a doctest.
+its result, a class each of its fields, and a method begins by what it returns. Every
+function, and every class that a package exports, has an example in the form of a
+doctest; the few that take minutes have theirs in a guide.
 """
 
 import ast
@@ -25,29 +26,35 @@ import jaxcam
 ROOT = Path(__file__).parents[1]
 # what an example may use without importing it
 GIVEN = {"jax": jax, "jnp": jnp, "np": np, "jaxcam": jaxcam}
-# a diagnosis takes minutes, a rig with a measured drive many lines: notebooks run these
-WITHOUT_EXAMPLE = {
-    "jaxcam.discrepancy.diagnose",
+# the guide with the example of a function; a diagnosis takes minutes
+IN_A_GUIDE = {
+    "jaxcam.discrepancy.diagnose": "discrepancy.md",
+    "jaxcam.discrepancy.predictions": "discrepancy.md",
+    "jaxcam.discrepancy.event_causes": "discrepancy.md",
+    "jaxcam.discrepancy.next_experiments": "discrepancy.md",
+    "jaxcam.discrepancy.compare_experiments": "discrepancy.md",
+    # starts processes, and needs an optional package
+    "jaxcam.sweeps.cluster": "sweeps.md",
+}
+# classes that are only returned by functions
+RETURNED = {
     "jaxcam.discrepancy.Diagnosis",
-    "jaxcam.discrepancy.predictions",
-    "jaxcam.discrepancy.event_causes",
-    "jaxcam.discrepancy.next_experiments",
-    "jaxcam.discrepancy.compare_experiments",
-    "jaxcam.fitting.first_bounce",
-    "jaxcam.fitting.train",
-    # needs a system near the interruption of its chattering, found in a minute
-    "variational.find_lobes",
-    "variational.fit_local_map",
-    # returned by functions that have one
     "jaxcam.fitting.FreeRun",
     "jaxcam.fitting.FreeRunFit",
-    # starts processes
-    "jaxcam.sweeps.cluster",
 }
 # each of its settings states its meaning where it is defined, for `Policy.settings`
 SETTINGS = {"jaxcam.discrepancy.Policy"}
 # quick to compile; the examples of all other packages are slow
-QUICK = ("jaxcam.maps.", "jaxcam.parameters.", "jaxcam.citation", "jaxcam.models.")
+QUICK = (
+    "jaxcam.maps.",
+    "jaxcam.parameters.",
+    "jaxcam.citation",
+    "jaxcam.models.",
+    "jaxcam.filippov.modes.",
+    "jaxcam.fitting.own_systems.",
+    "jaxcam.recordings.files.",
+    "jaxcam.timestepping.relay.is_p_matrix",
+)
 
 
 @functools.cache
@@ -94,6 +101,13 @@ def _names() -> list[str]:
 DEFINED = {name: _definition(name) for name in _names()}
 FUNCTIONS = {k: v for k, v in DEFINED.items() if isinstance(v, ast.FunctionDef)}
 CLASSES = {k: v for k, v in DEFINED.items() if isinstance(v, ast.ClassDef)}
+METHODS = {
+    f"{name}.{node.name}": node
+    for name, cls in CLASSES.items()
+    for node in cls.body
+    if isinstance(node, ast.FunctionDef)
+}
+DOCUMENTED = {**FUNCTIONS, **CLASSES, **METHODS}
 PACKAGES = (
     "jaxcam",
     "variational",
@@ -184,18 +198,31 @@ def _exported(name: str) -> bool:
     return name.rpartition(".")[0] in PACKAGES
 
 
-@pytest.mark.parametrize("name", sorted(filter(_exported, {**FUNCTIONS, **CLASSES})))
-def test_an_exported_name_has_an_example(name):
-    assert ">>> " in _doc(DEFINED[name]) or name in WITHOUT_EXAMPLE
+@pytest.mark.parametrize("name", sorted(set(filter(_exported, CLASSES)) - RETURNED))
+def test_an_exported_class_has_an_example(name):
+    assert ">>> " in _doc(CLASSES[name])
 
 
-EXAMPLES = [name for name in {**FUNCTIONS, **CLASSES} if ">>> " in _doc(DEFINED[name])]
+@pytest.mark.parametrize("name", sorted(set(FUNCTIONS) - set(IN_A_GUIDE)))
+def test_a_function_has_an_example(name):
+    assert ">>> " in _doc(FUNCTIONS[name])
+
+
+@pytest.mark.parametrize(("name", "guide"), IN_A_GUIDE.items())
+def test_the_example_of_a_slow_function_is_in_the_guide_that_it_names(name, guide):
+    doc = _doc(FUNCTIONS[name])
+    assert f"](../{guide}" in doc and ">>> " not in doc
+    code = re.compile(rf"\b{name.rpartition('.')[2]}\((?!\))")
+    assert code.search((ROOT / "docs" / guide).read_text("utf-8"))
+
+
+EXAMPLES = [name for name, node in DOCUMENTED.items() if ">>> " in _doc(node)]
 
 
 def _run(name: str, names: dict) -> dict:
     """Run the example of a name among `names`, and return what it has defined."""
     test = doctest.DocTestParser().get_doctest(
-        _doc(DEFINED[name]), names, name, None, 0
+        _doc(DOCUMENTED[name]), names, name, None, 0
     )
     shown = io.StringIO()
     done = doctest.DocTestRunner(verbose=False).run(
@@ -205,10 +232,16 @@ def _run(name: str, names: dict) -> dict:
     return test.globs
 
 
+def _given(name: str) -> dict:
+    """What an example may use: also what the one that it continues has defined."""
+    told = r"example\s+continues\s+the\s+one\s+in\s+\[`([\w.]+)`\]"
+    continued = re.search(told, _doc(DOCUMENTED[name]))
+    return {**GIVEN, **(_defined_by(continued[1]) if continued else {})}
+
+
 @functools.cache
-def _before(name: str) -> dict:
-    """What the example has defined that another one continues."""
-    return _run(name, dict(GIVEN))
+def _defined_by(name: str) -> dict:
+    return _run(name, _given(name))
 
 
 @pytest.mark.parametrize(
@@ -220,7 +253,5 @@ def _before(name: str) -> dict:
 )
 def test_an_example_prints_what_is_shown(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = r"example\s+continues\s+the\s+one\s+in\s+\[`([\w.]+)`\]"
-    continued = re.search(told, _doc(DEFINED[name]))
-    _run(name, {**GIVEN, **(_before(continued[1]) if continued else {})})
+    _run(name, _given(name))
     plt.close("all")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from jaxcam.data import DEMO_RIG
-from jaxcam.recordings import read_case, read_recording, RecordingError
-from jaxcam.recordings.files import CAM_FOLLOWER, Case, read_recordings
+from jaxcam.recordings import read_case, read_recording, Recording, RecordingError
+from jaxcam.recordings.files import CAM_FOLLOWER, Case, check_drive, read_recordings
 
 
 SPEED = 150.0 * math.pi / 30
@@ -198,6 +198,20 @@ def test_other_units_than_the_name_says(tmp_path):
     assert "milliseconds" in refusal(written(tmp_path, text(milliseconds)))
     file = written(tmp_path, text(table), "run1_170.0rpm.csv")
     assert "150.0 rpm, but the file name gives 170.0 rpm" in refusal(file)
+
+
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+@pytest.mark.parametrize("wraps", [False, True])
+@pytest.mark.parametrize(("unit", "turn"), [("degrees", 360.0), ("turns", 1.0)])
+def test_an_angle_in_another_unit_that_jumps_at_each_revolution(
+    rate, wraps, unit, turn
+):
+    """10 rad/s; at 100 Hz a step of 5.7 degrees is more than half a turn in rad."""
+    turned = 10.0 / (2 * np.pi) * np.arange(0.0, 2.0, 1 / rate)
+    angle = turn * (turned % 1 if wraps else turned)
+    run = Recording("run", np.arange(len(angle)) / rate, {"cam_angle_rad": angle}, 10.0)
+    with pytest.raises(RecordingError, match=f"`cam_angle_rad` looks like {unit}"):
+        check_drive(run)
 
 
 def test_dead_channel(tmp_path):

@@ -129,6 +129,14 @@ def test_cascade_of_the_logistic_map():
     ]  # fmt: skip
 
 
+def test_the_parameter_of_a_map_is_chosen_by_its_name():
+    """As for a section of a system; the fixed point is 1 - 1/mu."""
+    values = np.array([2.5, 2.9])
+    starts = np.full((2, 1), 0.3)
+    found = LOGISTIC.sample(starts, 400, 1, where="mu", values=values)
+    assert found.states[:, 0, 0] == pytest.approx(1 - 1 / values, abs=1e-12)
+
+
 def test_random_starts_do_not_depend_on_how_many_follow():
     few = monte_carlo([0, 1], [1, 3], 4, seed=3, points=2)
     many = monte_carlo([0, 1], [1, 3], 4, seed=3, points=5)

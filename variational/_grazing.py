@@ -112,6 +112,14 @@ class GrazingForm(eqx.Module):
 
         Returns:
             The depth; negative if there is no impact.
+
+        Examples:
+            >>> from jaxcam.models import ImpactOscillator
+            >>> from variational import grazing_form, orbit_of
+            >>> system = ImpactOscillator(omega=2.0, damping=0.0, wall=0.334)
+            >>> form = grazing_form(system, orbit_of(system, [-1 / 3, 0.0]))
+            >>> round(float(form.depth(jnp.zeros(2))), 6)  # 1/3 minus the wall
+            -0.000667
         """
         shift = 0.0 if mu is None else self.normal_parameters @ mu
         return -(self.clearance + self.normal @ z + shift)

@@ -135,6 +135,12 @@ def test_functions(
 
     Returns:
         Three real scalars.
+
+    Examples:
+        >>> from variational.floquet import test_functions
+        >>> fold, flip, _ = test_functions(jnp.array([0.5 + 0j, -1.0]))
+        >>> float(fold), float(flip)
+        (1.0, 0.0)
     """
     i, j = np.triu_indices(multipliers.shape[0], k=1)
     return (
@@ -161,6 +167,15 @@ def impact_scale(system: HybridSystem, orbit: Orbit) -> Float[Array, ""]:
 
     Returns:
         A scalar between 0 and 1.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational import orbit_of
+        >>> from variational.floquet import impact_scale
+        >>> ball = BouncingBall(restitution=1.0)
+        >>> orbit = orbit_of(ball, [9.81 / 8, 0.0], period=1.0)
+        >>> round(float(impact_scale(ball, orbit)), 6)  # v = g / 2, a = g, period 1
+        0.333333
     """
     count = int(orbit.impacts.count)
     if count == 0 or orbit.sticks:

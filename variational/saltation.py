@@ -139,6 +139,14 @@ def saltation_into_contact(
 
     Returns:
         The matrix, shape `(n, n)`.
+
+    Examples:
+        >>> from jaxcam.models import TripleIntegrator
+        >>> from variational.saltation import saltation_into_contact
+        >>> before = jnp.array([0.0, -1.0, -2.0])
+        >>> matrix = saltation_into_contact(TripleIntegrator(), 0.0, before)
+        >>> int(np.linalg.matrix_rank(matrix))
+        1
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)
@@ -175,6 +183,12 @@ def saltation_at_release(
 
     Returns:
         The matrix, shape `(n, n)`.
+
+    Examples:
+        >>> from jaxcam.models import TripleIntegrator
+        >>> from variational.saltation import saltation_at_release
+        >>> saltation_at_release(TripleIntegrator(), 0.0, jnp.zeros(3)).tolist()
+        [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state, dtype=jnp.float64)
@@ -242,6 +256,15 @@ def saltation_second(
 
     Returns:
         The derivative B, shape `(n, n, n)`.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational.saltation import saltation_second
+        >>> second = saltation_second(BouncingBall(), 0.0, jnp.array([0.0, -1.0]))
+        >>> np.asarray(second[:, 0, 0]).round(3).tolist()
+        [-17.658, -173.225]
+        >>> [round(-1.8 * 9.81, 3), round(-1.8 * 9.81**2, 3)]  # -(1 + r) g^k for v = 1
+        [-17.658, -173.225]
     """
     t = jnp.asarray(t, dtype=jnp.float64)
     x = jnp.asarray(state_before, dtype=jnp.float64)

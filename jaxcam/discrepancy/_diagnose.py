@@ -56,11 +56,11 @@ def diagnose(
 ) -> Diagnosis:
     """Determine from recordings what physics a model lacks.
 
-    A diagnosis takes minutes; the notebooks contain an example. Terms of the library
-    and unknown forces are sought at the first coordinate and the first gap, and unknown
-    functions that act at impacts are sought at the first two gaps. Other coordinates
-    and gaps are tried only if a residual above the noise remains; each such additional
-    search takes as long again.
+    A diagnosis takes minutes; [Model discrepancy](../discrepancy.md) shows examples.
+    Terms of the library and unknown forces are sought at the first coordinate and the
+    first gap, and unknown functions that act at impacts are sought at the first two
+    gaps. Other coordinates and gaps are tried only if a residual above the noise
+    remains; each such additional search takes as long again.
 
     Args:
         system: A `Rig` from `jaxcam.recordings.read_rig` or a `Setup` from

@@ -59,7 +59,9 @@ def event_causes(
     changes.
 
     Each term is tried alone. Four speeds hardly distinguish between terms: terms
-    whose misfit is within a few units of the smallest are equally good.
+    whose misfit is within a few units of the smallest are equally good. [Diagnosis from
+    speeds](../discrepancy.md#speeds-instead-of-recordings) shows an example, which
+    takes minutes.
 
     Args:
         rig: The rig.

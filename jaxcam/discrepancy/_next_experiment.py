@@ -64,7 +64,9 @@ def compare_experiments(
     """Rank proposed recordings by their expected information, the best first.
 
     The ranking needs only sensitivities: the Fisher information of each proposed
-    recording is added to that of the diagnosed recordings.
+    recording is added to that of the diagnosed recordings. It needs a diagnosis, which
+    takes minutes; [The next recording](../discrepancy.md#what-to-record-next) shows an
+    example.
 
     Args:
         found: The diagnosis of the recordings made so far.
@@ -149,6 +151,8 @@ def next_experiments(
     progress: Callable[[str, float | None], None] | None = None,
 ) -> tuple[Experiment, ...]:
     """Recommend the speeds at which to run a driven rig next, best first.
+
+    [The next recording](../discrepancy.md#what-to-record-next) shows an example.
 
     Args:
         found: The diagnosis of the recordings made so far.

@@ -60,7 +60,9 @@ def predictions(
     interruption of complete chatter. Their standard errors are estimated from random
     rigs, drawn from the distribution of the fitted parameters. Missing effects with a
     frequency of their own are left out, because they make the motion aperiodic: it does
-    not repeat with the cam.
+    not repeat with the cam. [Predicted
+    changes](../discrepancy.md#predicted-changes-of-the-motion) shows an example, which
+    takes minutes.
 
     Args:
         found: The diagnosis.

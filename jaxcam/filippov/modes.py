@@ -22,6 +22,14 @@ def surface_rates(
 
     Returns:
         Two scalars: the rates along the fields `above` and `below`.
+
+    Examples:
+        >>> from jaxcam.filippov.modes import surface_rates
+        >>> from jaxcam.models import BeltOscillator
+        >>> state = jnp.array([0.5, 0.2])  # spring force 0.5, friction 1
+        >>> above, below = surface_rates(BeltOscillator(belt=0.2), 0.0, state)
+        >>> round(float(above), 6), round(float(below), 6)
+        (-1.5, 0.5)
     """
     t = jnp.asarray(t, dtype=float)
 
@@ -55,6 +63,14 @@ def sliding_field(
 
     Returns:
         The sliding field, shape `(n,)`.
+
+    Examples:
+        >>> from jaxcam.filippov.modes import sliding_field
+        >>> from jaxcam.models import BeltOscillator
+        >>> system = BeltOscillator(belt=0.2)
+        >>> field = sliding_field(system, 0.0, jnp.array([0.5, 0.2]))
+        >>> np.asarray(field).round(6).tolist()  # the mass moves with the belt
+        [0.2, 0.0]
     """
     share = sliding_share(system, t, state)
     return share * system.above(t, state) + (1 - share) * system.below(t, state)
@@ -110,6 +126,13 @@ def region(system: FilippovSystem, t, state: Float[Array, " n"]) -> str:
 
     Returns:
         The kind of state, as one of these words.
+
+    Examples:
+        >>> from jaxcam.filippov.modes import region
+        >>> from jaxcam.models import BeltOscillator
+        >>> system = BeltOscillator(belt=0.2)
+        >>> [region(system, 0.0, jnp.array([x, 0.2])) for x in (-2.0, 0.5, 2.0)]
+        ['crossing up', 'sliding', 'crossing down']
     """
     above, below = (float(rate) for rate in surface_rates(system, t, state))
     if above == 0 or below == 0:

@@ -7,6 +7,7 @@ from ._cam_follower import (
     rig_sensors as rig_sensors,
 )
 from ._doubts import Doubt as Doubt
+from ._first_bounce import first_bounce as first_bounce
 from ._fit import fit as fit, held_out_cost as held_out_cost
 from ._fit_free_run import fit_free_run as fit_free_run, FreeRunFit as FreeRunFit
 from ._fit_result import Fit as Fit
@@ -18,7 +19,6 @@ from ._profile import excess_cost as excess_cost, profile as profile
 from ._read_setup import is_setup as is_setup, read_setup as read_setup
 from ._residuals import Residuals as Residuals, residuals as residuals
 from ._restitution import (
-    first_bounce as first_bounce,
     fit_restitution as fit_restitution,
     restitution_laws as restitution_laws,
     RestitutionFit as RestitutionFit,

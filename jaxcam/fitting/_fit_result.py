@@ -214,6 +214,12 @@ class Fit:
         """Return the model with the fitted parameters.
 
         A parameter that differs between recordings has its value for `record`.
+
+        The example continues the one in [`jaxcam.fitting.fit`][].
+
+        Examples:
+            >>> float(found.model().system.gravity) == found.estimates[0].value
+            True
         """
         names = self.problem.records
         row = names.index(record) if isinstance(record, str) else record

@@ -31,6 +31,7 @@ class Profile:
 
     @property
     def interval(self) -> tuple[float, float]:
+        """Ends of the 95 % interval."""
         best = int(np.argmin(self.cost))
         return (
             self._crossing(range(best, -1, -1), -np.inf),

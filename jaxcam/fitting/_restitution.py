@@ -1,4 +1,4 @@
-"""Fit restitution laws to all recorded impacts, or by the method of the thesis."""
+"""Fit restitution laws to all recorded impacts."""
 
 import dataclasses
 import re
@@ -9,14 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from ..hybrid import HybridSystem
 from ..hybrid.programs import program
-from ..hybrid.runge_kutta import array_step, RK4
 from ..models import ConstantRestitution, LinearInSpeed, PowerLawRestitution
 from ..recordings import RecordingError, Segments
-from .engine import Model, Turning
 
 
 # Residuals beyond this many standard errors count linearly, not quadratically (Huber)
@@ -29,8 +26,6 @@ _GRADIENT = 1e-2
 RANGE = 1.5
 # Quantiles of the speeds that are compared, because the slowest are inaccurate
 _LOW, _HIGH = 0.05, 0.95
-# Runge-Kutta steps of one flight
-_STEPS = 200
 
 
 @dataclasses.dataclass(frozen=True)
@@ -266,89 +261,3 @@ def _normal(law, names, values, data):
         return off, off
 
     return jax.jacfwd(loss, has_aux=True)(values)
-
-
-def first_bounce(
-    system: HybridSystem, segments: Segments, drive: Turning
-) -> Float[np.ndarray, " turns"]:
-    """Compute the coefficient of restitution from the height of the first rebound
-    (thesis, section 4.6.1).
-
-    In each period, the first impact after the release ends the highest flight. A
-    simulation starts on the surface at that impact, with a separation speed such that
-    the next flight rises as high above the cam as the recorded one; the coefficient is
-    this speed divided by the recorded approach speed. Unlike a fit of whole
-    trajectories, this method uses one number per period: the maximum of several noisy
-    samples.
-
-    Args:
-        system: The system.
-        segments: A segmented recording.
-        drive: The measured drive.
-
-    Returns:
-        One coefficient for each period with such a pair of flights, shape `(periods,)`.
-
-    Raises:
-        RecordingError: The recording has no measured drive.
-    """
-    impacts, flights = segments.impacts, segments.flights
-    if segments.drive is None:
-        raise RecordingError(
-            f"{segments.recording.name}: the recording was segmented without its "
-            f"drive; use `segment_case`."
-        )
-    time = segments.recording.time
-    found = []
-    for k in range(impacts.count):
-        before = flights[impacts.flight[k]]
-        after = flights[impacts.flight[k] + 1]
-        if before.start.kind != "release" or impacts.approach[k] <= 0:
-            continue
-        at = impacts.time[k]
-        angle = float(np.interp(at, time, segments.drive.angle))
-        rate = float(np.interp(at, time, segments.drive.rate))
-        speed = _speed_for_height(
-            Model(system, {}, drive).uniform(angle, rate),
-            float(impacts.angle[k]),
-            float(after.duration),
-            float(after.height),
-        )
-        found.append(float(speed) / impacts.approach[k])
-    return np.array(found)
-
-
-@program
-def _speed_for_height(system, angle, duration, height) -> Array:
-    """Find the separation speed of a flight of this `height` by bisection."""
-    # the gap is the follower angle minus the contact angle
-    contact = angle - system.gap(jnp.asarray(0.0), jnp.stack([angle, 0.0 * angle]))
-    start = jnp.stack([contact, jnp.zeros_like(contact)])
-    zero = jnp.zeros_like(contact)
-    _, slope = jax.jvp(lambda t: system.gap(t, start), (zero,), (jnp.ones_like(zero),))
-    h = 1.5 * duration / _STEPS
-
-    def top(speed):
-        def step(carry, _):
-            t, x, highest = carry
-            x, _, _ = array_step(RK4, system.vector_field, t, x, h)
-            gap = system.gap(t + h, x)
-            # a flight ends when the follower is back on the cam
-            open_ = (highest >= 0) & (gap > 0)
-            return (t + h, x, jnp.where(open_, jnp.maximum(highest, gap), highest)), gap
-
-        x = jnp.stack([contact, -slope + speed])
-        carry = (zero, x, zero)
-        (_, _, highest), _ = jax.lax.scan(step, carry, None, length=_STEPS)
-        return highest
-
-    def halve(_, bounds):
-        low, high = bounds
-        middle = (low + high) / 2
-        short = top(middle) < height
-        return jnp.where(short, middle, low), jnp.where(short, high, middle)
-
-    # upper bound of the speed: twice that of a parabola with this height and duration
-    high = 8 * height / duration + 1e-9
-    low, high = jax.lax.fori_loop(0, 40, halve, (zero, high + zero))
-    return (low + high) / 2

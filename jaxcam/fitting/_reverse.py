@@ -84,6 +84,8 @@ def train(
     states of the pieces into which the recordings are divided (multiple shooting) are
     fitted first, so the gradient is that of the cost minimised over the states.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         problem: The problem.
         where: Selects a field of the model, or a tuple of fields: `lambda m:
@@ -96,6 +98,14 @@ def train(
 
     Raises:
         ValueError: A parameter of the problem differs from recording to recording.
+
+    Examples:
+        >>> from jaxcam.fitting import train
+        >>> wrong = fitting.Model(BouncingBall(gravity=9.5), sensors)
+        >>> other = fitting.Problem.build(wrong, [parts], [])
+        >>> trained = train(other, lambda m: m.system.gravity, steps=10)
+        >>> round(float(trained.values), 2), trained.after < 0.1 * trained.before
+        (9.81, True)
     """
     own = [p.name for p in problem.parameters if p.per_record or p.known is not None]
     if own:

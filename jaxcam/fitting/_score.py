@@ -43,12 +43,21 @@ class Linearised:
     def gain(self, names: Iterable[str], beside: Iterable[str] = ()) -> float:
         """Return the gain in twice the log-likelihood if `names` were freed.
 
+        The example continues the one in [`jaxcam.fitting.fit`][].
+
         Args:
             names: Names of the parameters to free.
             beside: Parameters that are free in any case and absorb part of the gain.
 
         Returns:
             The gain.
+
+        Examples:
+            >>> from jaxcam.fitting import linearise
+            >>> held = fitting.fit(problem, free=())  # gravity at its nominal value
+            >>> gain = linearise(problem, held).gain(["gravity"])
+            >>> abs(gain - (held.cost - found.cost)) < 0.1
+            True
         """
         names, beside = tuple(names), tuple(beside)
         with_, without = self._best((*names, *beside)), self._best(beside)

@@ -68,7 +68,16 @@ class ForcedOscillator(eqx.Module):
         return jax.scipy.linalg.expm(matrix * duration)
 
     def solution(self, time, state: Float[Array, " 3"]) -> Float[Array, " 3"]:
-        """Return the exact state reached after `time` from `state`, shape `(3,)`."""
+        """Return the exact state reached after `time` from `state`, shape `(3,)`.
+
+        Examples:
+            >>> from jaxcam.models import ForcedOscillator
+            >>> system = ForcedOscillator()
+            >>> start = jnp.append(system.steady(0.0), 0.0)
+            >>> end = system.solution(system.period, start)
+            >>> np.allclose(end[:2], start[:2])  # the periodic motion
+            True
+        """
         start = state[2]
         moved = self.propagator(time) @ (state[:2] - self.steady(start))
         end = start + time

@@ -127,6 +127,13 @@ def system_to_json(
 
     Returns:
         A dictionary.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.models.saved import system_to_json
+        >>> plain = system_to_json(BouncingBall(restitution=0.7))["system"]
+        >>> plain["class"], plain["fields"]["restitution"]
+        ('BouncingBall', 0.7)
     """
     found = {"format": _FORMAT, "version": _VERSION, "system": _encode(system, "")}
     return found if about is None else {**found, "about": about}
@@ -146,6 +153,14 @@ def system_from_json(found: Any, *, classes: Iterable[type] = ()) -> HybridSyste
 
     Raises:
         ValueError: The description is invalid; the message gives the location.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.models.saved import system_from_json, system_to_json
+        >>> plain = system_to_json(BouncingBall(restitution=0.7))
+        >>> ball = system_from_json(plain)
+        >>> type(ball).__name__, float(ball.restitution)
+        ('BouncingBall', 0.7)
     """
     if not isinstance(found, dict) or found.get("format") != _FORMAT:
         raise ValueError(

@@ -116,6 +116,16 @@ def trajectory_curve(
 
     Returns:
         A [`jaxcam.plotting.curves.Curve`][].
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.plotting.curves import trajectory_curve
+        >>> motion = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+        >>> curve = trajectory_curve(motion, samples=100)
+        >>> int(np.isnan(curve.time).sum())  # one after each of two flights
+        2
+        >>> curve.impact_time.round(4).tolist()
+        [0.4515]
     """
     start, stop = window(trajectory, between)
     found = hits(trajectory, start, stop)

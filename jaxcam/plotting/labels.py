@@ -14,6 +14,11 @@ def labelled(name: str, unit: str) -> str:
 
     Returns:
         The label.
+
+    Examples:
+        >>> from jaxcam.plotting.labels import labelled
+        >>> labelled("speed", "rad/s"), labelled("ratio", "-"), labelled("reading", "")
+        ('speed (rad/s)', 'ratio (–)', 'reading')
     """
     if not unit:
         return name

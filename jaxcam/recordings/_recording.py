@@ -74,6 +74,12 @@ class Recording:
 
         Raises:
             RecordingError: Fewer than two samples remain.
+
+        Examples:
+            >>> from jaxcam.recordings import Recording
+            >>> run = Recording("run", np.arange(10.0), {"height_m": np.arange(10.0)})
+            >>> run.between(2.0, 5.0).time.tolist()
+            [2.0, 3.0, 4.0]
         """
         keep = (self.time >= start) & (self.time < stop)
         if keep.sum() < 2:

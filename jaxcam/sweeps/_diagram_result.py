@@ -91,6 +91,13 @@ class Diagram:
 
         Returns:
             A list of `Range`.
+
+        Examples:
+            >>> from jaxcam import sweeps
+            >>> logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+            >>> found = sweeps.diagram(logistic, "mu", [2.7, 2.8, 3.2], [0.3], keep=16)
+            >>> [(one.label, one.low, one.high) for one in found.ranges()]
+            [('period 1', 2.7, 2.8), ('period 2', 3.2, 3.2)]
         """
         found: list[Range] = []
         labels = self.labels[:, start]

@@ -58,6 +58,11 @@ class Grid(eqx.Module):
 
         Returns:
             Centres, shape `(cells,)`.
+
+        Examples:
+            >>> from jaxcam.sweeps import Grid
+            >>> Grid([0.0, -1.0], [1.0, 1.0], [4, 2]).centres(0).tolist()
+            [0.125, 0.375, 0.625, 0.875]
         """
         count = self.shape[axis]
         return self.low[axis] + self.sizes[axis] * (np.arange(count) + 0.5)
@@ -86,6 +91,12 @@ class Grid(eqx.Module):
 
         Returns:
             Indices in the order of the method `states`, shape `(motions,)`.
+
+        Examples:
+            >>> from jaxcam.sweeps import Grid
+            >>> grid = Grid([0.0, -1.0], [1.0, 1.0], [4, 2])
+            >>> grid.cells([[0.3, 0.5], [2.0, 0.0]]).tolist()  # the second is outside
+            [3, -1]
         """
         states = np.asarray(states, dtype=float)
         sizes = np.where(self.sizes > 0, self.sizes, 1.0)

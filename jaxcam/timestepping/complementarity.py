@@ -44,6 +44,13 @@ def lemke(matrix: Float[Array, "m m"], vector: Float[Array, " m"]) -> Pivoting:
 
     Returns:
         A [`jaxcam.timestepping.complementarity.Pivoting`][].
+
+    Examples:
+        >>> from jaxcam.timestepping.complementarity import lemke
+        >>> matrix = jnp.array([[2.0, 1.0], [1.0, 2.0]])
+        >>> found = lemke(matrix, jnp.array([-5.0, -7.0]))
+        >>> np.asarray(found.z).round(6).tolist(), int(found.code)
+        ([1.0, 3.0], 0)
     """
     m = vector.shape[0]
     one = jnp.ones(m, dtype=vector.dtype)
@@ -106,6 +113,13 @@ def solve_lcp(
 
     Raises:
         ValueError: Lemke's method finds no solution.
+
+    Examples:
+        >>> from jaxcam.timestepping.complementarity import solve_lcp
+        >>> matrix = jnp.array([[2.0, 1.0], [1.0, 2.0]])
+        >>> z = solve_lcp(matrix, jnp.array([-5.0, 1.0]))
+        >>> np.asarray(z).round(6).tolist()  # w = (0, 3.5)
+        [2.5, 0.0]
     """
     matrix = jnp.asarray(matrix, dtype=jnp.float64)
     vector = jnp.asarray(vector, dtype=jnp.float64)

@@ -71,6 +71,15 @@ def relay_problem(
 
     Returns:
         u and y, both of shape `(m,)`, and the result of Lemke's method.
+
+    Examples:
+        >>> from jaxcam.timestepping.relay import relay_problem
+        >>> u, y, _ = relay_problem(jnp.array([[0.5]]), jnp.array([-0.2]))
+        >>> round(float(u[0]), 6), abs(float(y[0])) < 1e-12  # sliding: 0.5 u - 0.2 = 0
+        (0.4, True)
+        >>> u, y, _ = relay_problem(jnp.array([[0.5]]), jnp.array([2.0]))
+        >>> round(float(u[0]), 6), round(float(y[0]), 6)
+        (-1.0, 1.5)
     """
     m = vector.shape[0]
     eye = jnp.eye(m, dtype=vector.dtype)
@@ -93,6 +102,12 @@ def is_p_matrix(matrix: Float[ArrayLike, "m m"]) -> bool:
 
     Raises:
         ValueError: The matrix has more than 14 rows; there are 2^m minors.
+
+    Examples:
+        >>> from jaxcam.timestepping.relay import is_p_matrix
+        >>> triangular = jnp.array([[1.0, 2.0], [0.0, 1.0]])
+        >>> is_p_matrix(triangular), is_p_matrix(triangular + triangular.T)
+        (True, False)
     """
     values = np.asarray(matrix)
     m = values.shape[0]

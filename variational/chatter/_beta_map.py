@@ -58,6 +58,12 @@ def beta_parts(lam, r) -> BetaMap:
         A [`variational.chatter.BetaMap`][]. It is zero up to lambda_bar, the fixed
             point of the lambda-map (thesis, eq. 6.45), where chatter is completed
             before release (`impacts` is then 0).
+
+    Examples:
+        >>> from variational.chatter import beta_parts
+        >>> parts = beta_parts(0.4, r=0.5)  # no impact follows
+        >>> round(float(parts.beta), 6), round(float(parts.gamma), 6)  # -0.1 and -1/15
+        (-0.1, -0.066667)
     """
     lam, r = jnp.broadcast_arrays(
         jnp.asarray(lam, jnp.float64), jnp.asarray(r, jnp.float64)

@@ -51,6 +51,14 @@ class ChatterFrame(eqx.Module):
 
         Returns:
             Lambda, dimensionless, in the broadcast shape.
+
+        Examples:
+            >>> from jaxcam.models import ImpactOscillator
+            >>> from variational import chatter_frame
+            >>> frame = chatter_frame(ImpactOscillator(omega=0.5, restitution=0.5))
+            >>> lam = frame.coordinate(frame.release - 2.0, speed=0.1)
+            >>> round(float(lam), 6)  # v / (c tau^2) with c = omega
+            0.05
         """
         tau = time - self.release
         return speed / (self.jerk * tau * tau)
@@ -174,6 +182,16 @@ def parameter_incidence(system: HybridSystem, where: Where, time=0.0) -> Chatter
     Returns:
         A [`variational.chatter.ChatterFrame`][] of derivatives, in the units of the
             frame divided by that of the parameter.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.chatter import parameter_incidence
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> rates = parameter_incidence(system, "omega")
+        >>> round(float(rates.release), 6)  # release is at pi / (2 omega)
+        -6.283185
+        >>> round(float(rates.jerk), 6)  # the jerk is omega
+        1.0
     """
     system = as_arrays(system)
     along = unit_tangent(where, system)

@@ -310,6 +310,15 @@ def simulated_by_parameter(
     Returns:
         A [`variational.chatter.SectionArrival`][] with a leading axis, at the section
             after the next release.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.chatter import simulated_by_parameter
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> changes = jnp.array([-1e-4, 1e-4])
+        >>> arrivals = simulated_by_parameter(system, "omega", changes, phase=0.35)
+        >>> arrivals.stuck.tolist()  # chatter is complete only below the interruption
+        [True, False]
     """
     system = as_arrays(system)
     value = jnp.asarray(pick(where, system)(system), jnp.float64)

@@ -83,20 +83,28 @@ def find_lobes(
         The [`variational.chatter.Lobes`][].
 
     Raises:
-        ValueError: Fewer than two lobes are found.
+        ValueError: Fewer than two lobes are found, chatter is complete for all
+            deviations or for none, `direction` does not change `component`, or the
+            system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import find_lobes, scaling_law
+        >>> system = ImpactOscillator(omega=0.6071945, restitution=0.5)
+        >>> state = jnp.array([-0.1041427, -0.2869127])  # on the sticking orbit
+        >>> sides = np.linspace(-1e-3, 1e-3, 32)
+        >>> lobes = find_lobes(system, state, sides, phase=0.35, samples=16, most=3)
+        >>> widths = np.abs(np.diff(lobes.corners))
+        >>> (widths[1:] / widths[:-1]).round(3).tolist()
+        [0.502, 0.502]
+        >>> round(float(scaling_law(0.5).q), 3)  # the limit of these ratios
+        0.503
     """
     check_chatter_system(system)
     system = as_arrays(system)
     state = jnp.asarray(state, jnp.float64)
     base = float(state[component])
-    axis = jnp.zeros(2).at[component].set(1.0)
-    along = axis if direction is None else jnp.asarray(direction, jnp.float64)
-    if float(along[component]) == 0:
-        raise ValueError(
-            f"direction is {np.asarray(along)}: it does not change component "
-            f"{component}. Give another component or direction."
-        )
-    along = along / along[component]
+    along = _along(direction, component)
     scan = base + np.asarray(deviations, dtype=float)
     # number of rows for the scan, the brackets, the points of the lobes, and three
     # calls with one row each
@@ -138,6 +146,18 @@ def find_lobes(
         scanned=scanned,
         impacts=impacts,
     )
+
+
+def _along(direction, component: int):
+    """Return the direction, scaled so that `component` changes by one."""
+    axis = jnp.zeros(2).at[component].set(1.0)
+    along = axis if direction is None else jnp.asarray(direction, jnp.float64)
+    if float(along[component]) == 0:
+        raise ValueError(
+            f"direction is {np.asarray(along)}: it does not change component "
+            f"{component}. Give another component or direction."
+        )
+    return along / along[component]
 
 
 def _rows(states: int) -> int:

@@ -57,6 +57,14 @@ def fly(system: HybridSystem, time, state, speed, duration, height: ArrayLike = 
     Returns:
         State `(n,)`, gap and normal velocity at the end; the gap retains its relative
             accuracy if the flight starts on the surface.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational.chatter import fly
+        >>> start = jnp.array([1.0, 0.0])
+        >>> _, gap, velocity = fly(BouncingBall(), 0.0, start, 0.0, 0.2, height=1.0)
+        >>> round(float(gap), 6), round(float(velocity), 6)  # 1 - g t^2 / 2 and -g t
+        (0.8038, -1.962)
     """
     rates = flight_rates(system, jnp.asarray(time, jnp.float64))
     y = on_flight(state, speed, height)

@@ -62,6 +62,14 @@ def next_impact(
 
     Returns:
         An [`variational.chatter.ImpactPoint`][].
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational.chatter import next_impact
+        >>> ball, rebound = BouncingBall(), jnp.array([0.0, 0.981])
+        >>> point = next_impact(ball, 0.0, rebound, speed=0.981, horizon=1.0)
+        >>> round(float(point.time), 6), round(float(point.speed), 6)  # 2 v / g and r v
+        (0.2, 0.7848)
     """
     time = jnp.asarray(time, jnp.float64)
     longest = longest_step(system, horizon)
@@ -203,7 +211,14 @@ def surface_state(system: HybridSystem, time, speed, guess=None):
 
     Returns:
         State, shape `(2,)`.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.chatter import surface_state
+        >>> surface_state(ImpactOscillator(wall=0.5), 0.0, speed=0.2).tolist()
+        [0.5, -0.2]
     """
+    time = jnp.asarray(time, jnp.float64)
     guess = jnp.zeros(2) if guess is None else guess
     rest = contact_state(system, time[None], guess)[0]
     return rest + speed * normal_directions(system, time, rest)[0]

@@ -90,6 +90,14 @@ def interruption_in(
 
     Returns:
         An [`variational.chatter.Interruption`][].
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.chatter import interruption_in
+        >>> system = ImpactOscillator(omega=1.0, restitution=0.5)
+        >>> found = interruption_in(system, "omega", 0.4, 0.8)
+        >>> bool(found.converged), round(float(found.value), 4)
+        (True, 0.6072)
     """
     low, high = jnp.asarray(low, jnp.float64), jnp.asarray(high, jnp.float64)
     return _solve(line(system, where), low, high, periods=periods)

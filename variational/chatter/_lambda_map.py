@@ -35,6 +35,11 @@ def hop_ratio(lam) -> Float[Array, "..."]:
     Returns:
         h, between 1 and -1/2 (thesis, eq. 6.33); negative if the next impact is after
             release; NaN above 3/8, where there is no next impact.
+
+    Examples:
+        >>> from variational.chatter import hop_ratio
+        >>> np.asarray(hop_ratio(jnp.array([0.0, 1 / 3, 3 / 8]))).round(6).tolist()
+        [1.0, 0.0, -0.5]
     """
     return (3 * _root(lam) - 1) / 2
 

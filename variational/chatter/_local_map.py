@@ -86,11 +86,22 @@ def fit_local_map(lobes: Lobes) -> LocalMap:
     sampled slope at its points of slope 1, 0 and -1; a slope that the lobe does not
     reach is replaced by the nearest one.
 
+    The example continues the one in [`variational.find_lobes`][].
+
     Args:
         lobes: The sampled lobes.
 
     Returns:
         A [`variational.chatter.LocalMap`][].
+
+    Examples:
+        >>> from variational import fit_local_map
+        >>> local = fit_local_map(lobes)
+        >>> round(float(jnp.exp(local.M)), 3), round(float(jnp.exp(local.Q)), 3)
+        (0.502, 0.437)
+        >>> law = scaling_law(0.5)  # eq. 6.49: widths scale by q, heights by p^2
+        >>> round(float(law.q), 3), round(float(law.p**2), 3)
+        (0.503, 0.436)
     """
     width, height = np.abs(np.diff(lobes.corners)), np.abs(np.diff(lobes.values))
     k = np.arange(len(width))

@@ -73,6 +73,18 @@ def to_section(
 
     Returns:
         A [`variational.chatter.SectionArrival`][].
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import chatter_frame
+        >>> from variational.chatter import release_impacts, to_section
+        >>> system = ImpactOscillator(omega=0.5, restitution=0.5)
+        >>> first = jax.tree.map(lambda x: x[0], release_impacts(system, 1))
+        >>> frame = chatter_frame(system, system.period)  # release in the next period
+        >>> arrival = to_section(system.prepared(), frame, first, frame.release + 0.1)
+        >>> cubic = frame.jerk * 0.1**3 / 6  # first term of the gap after release
+        >>> bool(arrival.stuck), round(float(arrival.gap / cubic), 3)
+        (True, 0.999)
     """
     section = jnp.asarray(section, jnp.float64)
 
@@ -172,6 +184,18 @@ def release_impacts(system: HybridSystem, count: int, time=0.0) -> ImpactPoint:
         A [`variational.chatter.ImpactPoint`][] with a leading axis of impacts. The
             times are in the period that starts at the release of `chatter_frame(system,
             time)`; `found` is false from the first flight that does not return.
+
+    Raises:
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.chatter import release_impacts
+        >>> impacts = release_impacts(ImpactOscillator(omega=1.0, restitution=0.5), 3)
+        >>> np.asarray(impacts.time).round(4).tolist()
+        [6.0642, 7.951, 12.1986]
+        >>> np.asarray(impacts.speed / -impacts.approach).round(6).tolist()
+        [0.5, 0.5, 0.5]
     """
     check_chatter_system(system)
     return _from_release(as_arrays(system), count, jnp.asarray(time, jnp.float64))
@@ -228,6 +252,19 @@ def section_to_impact(system: HybridSystem, state, phase, rank) -> ImpactPoint:
 
     Returns:
         An [`variational.chatter.ImpactPoint`][].
+
+    Raises:
+        ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational.chatter import section_to_impact
+        >>> dropped = jnp.array([1.0, 0.0])
+        >>> point = section_to_impact(BouncingBall(), dropped, phase=0.0, rank=1)
+        >>> round(float(point.time), 6)
+        1.173961
+        >>> round((1 + 2 * 0.8) * (2 * 1.0 / 9.81) ** 0.5, 6)  # (1 + 2 r) sqrt(2 h / g)
+        1.173961
     """
     check_chatter_system(system)
     system = as_arrays(system).prepared()

@@ -111,6 +111,17 @@ def orbit_monodromy(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, "n
 
     Returns:
         The matrix, shape `(n, n)`. Its eigenvalues are the Floquet multipliers.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.orbits import one_impact_orbits, orbit_monodromy
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = one_impact_orbits(system, jnp.array([-0.5, 0.0]))[0]
+        >>> matrix = orbit_monodromy(system, orbit)
+        >>> np.asarray(matrix).round(4).tolist()
+        [[0.4988, -0.6255], [0.9567, 0.0834]]
+        >>> round(float(jnp.linalg.det(matrix)), 6)  # restitution squared
+        0.64
     """
     return monodromy_of(orbit.shooting, orbit.unknowns(system), system)
 
@@ -171,6 +182,17 @@ def clearance(system: HybridSystem, orbit: ImpactOrbit) -> Float[Array, ""]:
 
     Returns:
         A scalar.
+
+    Examples:
+        >>> from jaxcam.models import BouncingBall
+        >>> from variational.orbits import clearance, ImpactOrbit
+        >>> ball = BouncingBall(restitution=1.0, frequency=4 * jnp.pi)
+        >>> up = ImpactOrbit(jnp.zeros(1), jnp.array([[0.0, 9.81 / 4]]))
+        >>> round(float(clearance(ball, up)), 6)  # height v^2 / (2 g)
+        0.306562
+        >>> down = ImpactOrbit(jnp.zeros(1), jnp.array([[0.0, -1.0]]))
+        >>> float(clearance(ball, down)) < 0
+        True
     """
     shooting, u = orbit.shooting, orbit.unknowns(system)
     seen = shooting.seen(u, system)

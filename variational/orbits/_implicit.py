@@ -30,6 +30,12 @@ def implicit_root(
 
     Returns:
         The root, shape `(n,)`; NaN if Newton's method does not converge.
+
+    Examples:
+        >>> from variational.orbits import implicit_root
+        >>> root = lambda p: implicit_root(lambda x: x**2 - p, jnp.array([1.0]))[0]
+        >>> round(float(root(2.0)), 6), round(float(jax.grad(root)(2.0)), 6)
+        (1.414214, 0.353553)
     """
 
     def newton(function, start):

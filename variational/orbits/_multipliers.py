@@ -21,6 +21,14 @@ def eigenvalues(
 
     Returns:
         Shape `(n,)`, complex.
+
+    Examples:
+        >>> from variational.orbits import eigenvalues
+        >>> large = jnp.array([[1e15, 1e15], [-0.5, -0.5 + 0.64e-15]])
+        >>> f"{eigenvalues(large)[1].real:.3e}"
+        '6.875e-16'
+        >>> f"{eigenvalues(large, jnp.array(0.64))[1].real:.3e}"
+        '6.400e-16'
     """
     if matrix.shape[0] == 2:
         return _two(matrix, determinant)

@@ -31,6 +31,17 @@ def one_impact_orbits(system: HybridSystem, state) -> list[ImpactOrbit]:
 
     Raises:
         ValueError: The system has no period.
+
+    Examples:
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational import orbit_trace
+        >>> from variational.orbits import one_impact_orbits
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbits = one_impact_orbits(system, jnp.array([-0.5, 0.0]))
+        >>> [round(float(orbit_trace(system, orbit)), 4) for orbit in orbits]
+        [0.5822, 3.527]
+        >>> round(1 + 0.8**2, 4)  # the trace at a fold, which saddles exceed
+        1.64
     """
     if system.period is None:
         raise ValueError(

@@ -70,6 +70,19 @@ def seed(
 
     Raises:
         ValueError: The motion sticks, or has no impact and no forcing.
+
+    Examples:
+        >>> import continuation
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from variational.orbits import seed
+        >>> system = ImpactOscillator(omega=2.8, restitution=0.8, wall=-0.5)
+        >>> orbit = continuation.periodic_orbit(system, guess=[-0.8, 1.0])
+        >>> equations, unknowns = seed(system, orbit, periods=1)
+        >>> unknowns.round(4).tolist()  # time, position and velocity after the impact
+        [0.0322, -0.5, -0.6586]
+        >>> residual = equations.residual(jnp.asarray(unknowns), system)
+        >>> float(jnp.max(jnp.abs(residual))) < 1e-9
+        True
     """
     if int(motion.contacts.count):
         raise ValueError(

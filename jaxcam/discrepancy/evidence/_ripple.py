@@ -61,6 +61,7 @@ class Ripple:
 
     @property
     def delta_bic(self) -> float:
+        """BIC with the ripple minus BIC without it."""
         return 2 * math.log(max(self.count, 2)) - self.gain
 
 
@@ -80,6 +81,17 @@ def ripple_of(
 
     Returns:
         A [`jaxcam.discrepancy.evidence.Ripple`][].
+
+    Examples:
+        >>> from jaxcam.discrepancy.evidence import ripple_of
+        >>> from jaxcam.recordings import Recording
+        >>> angle, rng = np.linspace(0.0, 60.0, 3000), np.random.default_rng(0)
+        >>> wave = angle + 1e-3 * np.sin(angle - 0.5) + rng.normal(0.0, 1e-4, 3000)
+        >>> channels = {"cam_angle_rad": wave}
+        >>> runs = [Recording(name, angle / 15, channels) for name in "ab"]
+        >>> found = ripple_of(runs, noise=1e-4)
+        >>> round(found.eps, 4), round(found.psi, 1)
+        (0.001, 0.5)
     """
     orders = (1.0, *policy.drive_orders)
     amplitudes, errors, samples = [], [], 0
@@ -100,9 +112,9 @@ def ripple_of(
     psi = float(np.angle(mean)) % (2 * math.pi)
     return Ripple(
         eps=float(eps),
-        eps_stderr=stderr,
+        eps_stderr=float(stderr),
         psi=psi,
-        psi_stderr=stderr / max(eps, _TINY),
+        psi_stderr=float(stderr / max(eps, _TINY)),
         gain=gain,
         p_value=float(chi2.sf(gain, 2)),
         count=samples,

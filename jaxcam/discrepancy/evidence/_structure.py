@@ -105,6 +105,7 @@ class Structure:
 
     @property
     def significant(self) -> bool:
+        """Whether its gain exceeds the threshold, also on held-out data."""
         return self.gain > self.threshold and self.predicted_gain > 0
 
     @property

@@ -86,6 +86,7 @@ class Effect:
     """
 
     def to_json(self) -> dict[str, Any]:
+        """Return the effect as plain numbers and strings."""
         return {
             "name": self.name,
             "parameters": {

@@ -322,6 +322,14 @@ def saved_classes() -> tuple[type, ...]:
 
     Returns:
         A tuple of classes.
+
+    Examples:
+        >>> from jaxcam.discrepancy.terms import saved_classes, system_with_terms
+        >>> from jaxcam.models import BouncingBall
+        >>> from jaxcam.models.saved import system_from_json, system_to_json
+        >>> plain = system_to_json(system_with_terms(BouncingBall(), ()))
+        >>> type(system_from_json(plain, classes=saved_classes())).__name__
+        'WithTerms'
     """
     terms = (type(term) for term in library(extended=True))
     elements = (WithHidden, SwitchedWithHidden, Resonator, Relaxation, Hysteresis)

@@ -21,14 +21,11 @@ from ._eliminate import (
     state_steps as state_steps,
 )
 from ._event_limit import crowded_pieces as crowded_pieces
+from ._extras import Extras as Extras
 from ._fly import runge_kutta as runge_kutta
 from ._known_constants import with_constants as with_constants
 from ._layout import Layout as Layout
-from ._linear import (
-    Extras as Extras,
-    linear_pieces as linear_pieces,
-    LinearPieces as LinearPieces,
-)
+from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
 from ._linearise import (
     assemble as assemble,
     Blocks as Blocks,

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ._eliminate import eliminate_states, LEAST
-from ._linear import Extras
+from ._extras import Extras
 from ._linearise import assemble, Blocks, Costs, Point
 from ._parameter import Parameter
 from ._problem import Problem
@@ -44,6 +44,7 @@ class Columns:
 
     @property
     def scales(self) -> Float[np.ndarray, "r m"]:
+        """Scale of each column of `local`, zero for padding, shape `(r, m)`."""
         padded = np.append(self.scale, 0.0)
         return padded[self.place]
 
@@ -60,6 +61,8 @@ class Columns:
 def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     """Return the free values of a problem, given the names of the parameters.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         problem: The problem.
         free: Names of the parameters; `None` for all.
@@ -69,6 +72,12 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
 
     Raises:
         ValueError: A name is unknown, or its values are known constants.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import free_columns
+        >>> columns = free_columns(problem, None)
+        >>> columns.labels(problem), columns.scale.tolist()
+        (('gravity',), [1.0])
     """
     if free is None:
         free = [one.name for one in problem.parameters if one.known is None]
@@ -181,6 +190,12 @@ def invert_information(
 
     Raises:
         ValueError: The matrix is not finite, for example because the model yields NaN.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import invert_information
+        >>> information = np.array([[4.0, 0.0], [0.0, 0.0]])
+        >>> invert_information(information).tolist()  # the second value is undetermined
+        [[0.25, 0.0], [0.0, inf]]
     """
     if not np.all(np.isfinite(information)):
         raise ValueError(
@@ -205,6 +220,8 @@ def invert_information(
 def off_nominal(problem: Problem, columns: Columns, point: Point):
     """Return the deviation of each free value from nominal, in units of its scale.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         problem: The problem.
         columns: The free values.
@@ -212,6 +229,12 @@ def off_nominal(problem: Problem, columns: Columns, point: Point):
 
     Returns:
         Deviations, shape `(g,)`.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import free_columns, off_nominal
+        >>> (off,) = off_nominal(problem, free_columns(problem, None), found.point)
+        >>> bool(np.isclose(off, found.estimates[0].value - 9.81))  # the scale is 1
+        True
     """
     values = np.asarray(point.values)
     now = values[np.maximum(columns.record, 0), columns.parameter]
@@ -231,6 +254,8 @@ def prior_information(problem: Problem, columns: Columns, prior: bool):
 
     It is zero with `prior=False`, and for a parameter without prior knowledge.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         problem: The problem.
         columns: The free values.
@@ -238,6 +263,12 @@ def prior_information(problem: Problem, columns: Columns, prior: bool):
 
     Returns:
         Information of each free value, shape `(g,)`.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import free_columns, prior_information
+        >>> columns = free_columns(problem, None)  # tolerance 1, stderr 1 / sqrt(3)
+        >>> prior_information(problem, columns, prior=True).round(3).tolist()
+        [3.0]
     """
     stderr = np.array([problem.parameters[p].prior_stderr for p in columns.parameter])
     return (columns.scale / stderr) ** 2 if prior else np.zeros(len(columns.scale))

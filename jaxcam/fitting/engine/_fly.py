@@ -128,6 +128,8 @@ def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
 def runge_kutta(model: Model, system_at, t, x, h):
     """Take one classical Runge-Kutta step of length `h`.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         model: The model.
         system_at: The system as a function of time.
@@ -137,6 +139,13 @@ def runge_kutta(model: Model, system_at, t, x, h):
 
     Returns:
         The state after the step, and the slope at its start.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import runge_kutta
+        >>> state = jnp.array([1.0, 0.0])
+        >>> after, _ = runge_kutta(model, lambda t: model.system, 0.0, state, 0.2)
+        >>> np.asarray(after).round(6).tolist()  # 1 - g t^2 / 2 and -g t
+        [0.8038, -1.962]
     """
 
     def field(t, x):

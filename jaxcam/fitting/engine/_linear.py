@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._extras import Extras, Sharpness
 from ._fly import flight_with_substeps, fly_about
 from ._likelihood import score_all
 from ._model import Model
@@ -23,35 +24,6 @@ from ._predict import (
     samples,
 )
 from ._through_nodes import normal_through, shares_of
-
-
-class Sharpness(NamedTuple):
-    """Standard errors of the joints of one recording, and of the state of a typical
-    piece.
-
-    Multiplied by the factor `apart`, the errors of the joints are so large that each
-    piece is fitted separately.
-    """
-
-    flight: Float[Array, "k n"]
-    impact: Float[Array, "k n"]
-    gap: Float[Array, " k"]
-    piece: Float[Array, "k n"]
-    apart: Float[Array, ""]
-
-
-class Extras(NamedTuple):
-    """Further arguments of a compiled program: reference states in contact and the
-    errors of the joints.
-
-    `weight` `(r, k)` and `rest_weight` `(r, kc)` are the weights of the data of each
-    piece.
-    """
-
-    guess: Float[Array, "r kc n"]
-    sharpness: Sharpness
-    weight: Float[Array, "r k"]
-    rest_weight: Float[Array, "r kc"]
 
 
 class LinearPieces(NamedTuple):
@@ -101,6 +73,8 @@ def linear_pieces(
 ) -> LinearPieces:
     """Linearise one recording about its states.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         model_at: `model_at(change, start, step)` is the model of a piece that begins at
             `start` with steps of length `step`, where `change` `(m,)` is the change of
@@ -114,6 +88,17 @@ def linear_pieces(
 
     Returns:
         A [`jaxcam.fitting.engine.LinearPieces`][].
+
+    Examples:
+        >>> from jaxcam.fitting.engine import linear_pieces
+        >>> first = lambda tree: jax.tree.map(lambda leaf: leaf[0], tree)
+        >>> values, states = first(found.point)
+        >>> model_at = lambda change, start, step: problem.layout.at(values + change)
+        >>> record = first(problem.pieces), first(problem.extras), states
+        >>> made = jax.jit(lambda: linear_pieces(model_at, *record, 1, False))()
+        >>> cost = jnp.sum(made.flown_cost) + jnp.sum(made.joint_cost)
+        >>> round(float(cost / found.cost), 3)
+        1.0
     """
     size, origin = states.shape[-1], jnp.zeros(width)
     found = _linear_flights(model_at, pieces, extras, states, origin, shown)

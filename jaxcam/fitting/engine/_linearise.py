@@ -11,11 +11,11 @@ from jaxtyping import Array, Float, Int
 from ...hybrid.caches import Cache
 from ...hybrid.programs import program
 from ._each_record import each_record, kinds, of_record
+from ._extras import Extras
 from ._fly import fly, fly_without_derivatives
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
-    Extras,
     flight_inputs,
     flown,
     joint,
@@ -93,6 +93,8 @@ def assemble(
 
     The last results are kept: if only the scales differ, they are converted.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         layout: The location of the parameters in the model.
         pieces: The pieces of all recordings.
@@ -103,6 +105,15 @@ def assemble(
 
     Returns:
         Normal equations and costs.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import assemble, free_columns
+        >>> columns = free_columns(problem, None)
+        >>> given = problem.layout, problem.pieces, problem.extras, found.point
+        >>> free = jnp.asarray(columns.local), jnp.asarray(columns.scales)
+        >>> blocks, costs = assemble(*given, *free)
+        >>> round(float(np.sum(costs.flown)) / len(run), 2)  # per sample
+        1.0
     """
 
     about = extras, point, columns
@@ -288,12 +299,19 @@ def total_cost(costs: Costs, extras) -> float:
     """Return the weighted cost of all pieces; a joint has the smaller of the weights of
     its two pieces.
 
+    The example continues the one in [`jaxcam.fitting.engine.assemble`][].
+
     Args:
         costs: The costs.
         extras: Further arguments of the compiled programs, with the weights.
 
     Returns:
         The cost.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import total_cost
+        >>> bool(np.isclose(total_cost(costs, problem.extras), found.cost))
+        True
     """
     total = 0.0
     with np.errstate(over="ignore", invalid="ignore"):

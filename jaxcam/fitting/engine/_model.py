@@ -93,6 +93,7 @@ class Sensor(eqx.Module):
 
     @property
     def filtered(self) -> bool:
+        """Whether the sensor has a limited bandwidth."""
         return self.bandwidth_hz != float("inf")
 
     @property
@@ -279,6 +280,13 @@ def cam_follower_drive() -> Turning:
 
     Returns:
         A [`jaxcam.fitting.Turning`][].
+
+    Examples:
+        >>> from jaxcam.fitting.engine import cam_follower_drive
+        >>> from jaxcam.models import preset
+        >>> rig, drive = preset("calibrated"), cam_follower_drive()
+        >>> round(float(drive.speed(rig)) * 30 / np.pi, 1)  # rpm
+        145.0
     """
     return _CAM_DRIVE
 

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid.programs import program
+from ._extras import Extras
 from ._fly import end_of_flight
 from ._layout import Layout
-from ._linear import Extras
 from ._linearise import Point
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces

@@ -56,9 +56,9 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from ...recordings import RecordingError, Segments
+from ._extras import Extras
 from ._known_constants import known_constants
 from ._layout import Layout, strongly_typed
-from ._linear import Extras
 from ._linearise import Point
 from ._model import Input, Model
 from ._own_states import own_states
@@ -289,6 +289,13 @@ class Problem:
     def between(self, start: ArrayLike, stop: ArrayLike) -> Weights:
         """Return weights that count only the pieces of each recording that begin in a
         time span (s); the span may differ between recordings, `(records,)`.
+
+        The example continues the one in [`jaxcam.fitting.fit`][].
+
+        Examples:
+            >>> half = fitting.fit(problem, weights=problem.between(0.0, 0.5))
+            >>> half.estimates[0].stderr > found.estimates[0].stderr
+            True
         """
         low, high = (np.expand_dims(np.asarray(t), -1) for t in (start, stop))
 

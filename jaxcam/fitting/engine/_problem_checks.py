@@ -80,6 +80,8 @@ def refuse_repeated(parameters) -> None:
 def parameter_places(model: Model, parameters) -> tuple[int, ...]:
     """Return the index of each parameter among the leaves of a model, for a `Layout`.
 
+    The example continues the one in [`jaxcam.fitting.fit`][].
+
     Args:
         model: The model.
         parameters: The parameters.
@@ -90,6 +92,12 @@ def parameter_places(model: Model, parameters) -> tuple[int, ...]:
     Raises:
         ValueError: A parameter is not a single number of the model, or it is the same
             number as another parameter.
+
+    Examples:
+        >>> from jaxcam.fitting.engine import parameter_places
+        >>> (place,) = parameter_places(model, [gravity])
+        >>> float(jax.tree.leaves(model)[place])
+        9.81
     """
     leaves, tree = jax.tree.flatten(model)
     numbered = jax.tree.unflatten(tree, list(range(len(leaves))))

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from ...hybrid.programs import program
+from ._extras import Extras, Sharpness
 from ._fly import fly
 from ._layout import Layout
-from ._linear import Extras, Sharpness
 from ._linearise import assemble, Point
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces

@@ -10,9 +10,9 @@ import numpy as np
 from ...hybrid import SwitchedSystem
 from ...hybrid.programs import program
 from ._driven_steps import input_in_steps, lines_in_parts
+from ._extras import Extras
 from ._fly import end_of_flight, fly_without_derivatives
 from ._layout import Layout
-from ._linear import Extras
 from ._linearise import Point
 from ._model import DriveState, Input, Model
 from ._pieces import Pieces

@@ -47,6 +47,14 @@ def stated_system(
     Raises:
         RigError: The system cannot be created; the message names the file, the field
             and the fix.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> from jaxcam.fitting.own_systems import stated_system
+        >>> from jaxcam.models import BouncingBall
+        >>> ball = stated_system(Path("ball.toml"), BouncingBall, {"restitution": 0.6})
+        >>> float(ball.restitution), float(ball.gravity)
+        (0.6, 9.81)
     """
     known = inspect.signature(cls).parameters
     for name in (*values, *measured):

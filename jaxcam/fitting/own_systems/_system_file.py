@@ -33,6 +33,12 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
 
     Raises:
         RigError: The class cannot be loaded; the message gives the file and a fix.
+
+    Examples:
+        >>> from jaxcam.data import NEW_RIG
+        >>> from jaxcam.fitting.own_systems import system_class
+        >>> system_class("cart.py:Cart", NEW_RIG)().constraint_names
+        ('left stop', 'right stop')
     """
     path, name = split_name(named)
     file = Path(folder) / path
@@ -68,6 +74,15 @@ def system_source(cls: type[HybridSystem]) -> str | None:
 
     Returns:
         File and class as text, or `None`.
+
+    Examples:
+        >>> from jaxcam.data import NEW_RIG
+        >>> from jaxcam.fitting.own_systems import system_class, system_source
+        >>> cart = system_class("cart.py:Cart", NEW_RIG)
+        >>> system_source(cart).endswith("cart.py:Cart")
+        True
+        >>> system_source(jaxcam.models.BouncingBall) is None
+        True
     """
     for file, (_, module) in _loaded.items():
         if getattr(module, cls.__name__, None) is cls:

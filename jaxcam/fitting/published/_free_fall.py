@@ -61,6 +61,16 @@ def fit_free_fall(
 
     Raises:
         ValueError: The times do not increase.
+
+    Examples:
+        >>> from jaxcam.fitting.published import fit_free_fall
+        >>> from jaxcam.models import BouncingBall
+        >>> times = np.linspace(0.0, 0.4, 9)
+        >>> height, start = (1 - 4.905 * times**2).round(3), np.array([0.9, 0.0])
+        >>> ball, gravity = BouncingBall(gravity=9.0), lambda ball: ball.gravity
+        >>> fit = fit_free_fall(ball, gravity, times, height, 3e-4, state=start)
+        >>> fit.estimates.round(2).tolist()  # gravity, height and velocity
+        [9.82, 1.0, 0.0]
     """
     times, measured = np.asarray(times, dtype=float), np.asarray(measured, dtype=float)
     state = np.asarray(state, dtype=float)

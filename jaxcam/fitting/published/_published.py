@@ -82,6 +82,12 @@ def rounding_error(decimals: int) -> float:
 
     Returns:
         10^-decimals / sqrt(12).
+
+    Examples:
+        >>> from jaxcam.fitting.published import rounding_error
+        >>> drawn = np.random.default_rng(0).uniform(0.0, 1.0, 100000)
+        >>> round(rounding_error(2), 5), round(float(np.std(drawn.round(2) - drawn)), 5)
+        (0.00289, 0.00288)
     """
     return 10.0**-decimals / 12**0.5
 

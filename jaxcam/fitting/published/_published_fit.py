@@ -95,10 +95,12 @@ class PublishedFit:
 
     @property
     def stderr(self) -> Float[np.ndarray, " p"]:
+        """Standard error of each estimate, shape `(p,)`."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self) -> Float[np.ndarray, "p p"]:
+        """Correlation matrix of the estimates, shape `(p, p)`."""
         errors = self.stderr
         return self.covariance / np.outer(errors, errors)
 
@@ -117,6 +119,7 @@ class PublishedFit:
 
     @property
     def chi_square(self) -> float:
+        """Sum of squared misfits, in standard errors."""
         return float(np.sum(self._misses() ** 2))
 
     def parameters(self) -> "pd.DataFrame":

@@ -128,6 +128,13 @@ class Trajectory(Printed):
 
         Returns:
             Gaps, shape `(times,)`, or `(times, m)` for m > 1 constraints.
+
+        Examples:
+            >>> from jaxcam.models import BouncingBall
+            >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+            >>> gaps = trajectory.gap([0.0, 0.2])
+            >>> np.asarray(gaps).round(4).tolist()  # 1 - g t^2 / 2
+            [1.0, 0.8038]
         """
         states = self.at(times)
         if is_traced((self, times)) or is_tracing():
@@ -184,6 +191,12 @@ class Trajectory(Printed):
 
         Raises:
             ValueError: The system has no period and none is given.
+
+        Examples:
+            >>> from jaxcam.models import BouncingBall
+            >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+            >>> np.asarray(trajectory.stroboscopic(0.2)[:, 0]).round(4).tolist()
+            [1.0, 0.8038, 0.2152, 0.418, 0.6392, 0.468]
         """
         refuse_tracers("stroboscopic", "trajectory.at(times)", self, period, phase)
         period = self.system.period if period is None else period
@@ -209,6 +222,15 @@ class Trajectory(Printed):
 
         Returns:
             Times (s) and states, shapes `(k,)` and `(k, n)`.
+
+        Examples:
+            >>> from jaxcam.models import BouncingBall
+            >>> trajectory = jaxcam.simulate(BouncingBall(), [1.0, 0.0], 0.0, 1.0)
+            >>> times, states = trajectory.section(lambda t, x: x[1], direction=-1)
+            >>> np.asarray(times).round(4).tolist()  # top: (1 + r) sqrt(2 h / g)
+            [0.8127]
+            >>> np.asarray(states[:, 0]).round(4).tolist()  # r^2 h
+            [0.64]
         """
         refuse_tracers("section", "trajectory.at(times)", self)
         return crossings(self, function, direction)

@@ -94,6 +94,8 @@ def compare_case(
 ) -> Comparison:
     """Compare all recordings of a cam-follower with its nominal model.
 
+    The example continues the one in [`jaxcam.recordings.segment_case`][].
+
     Args:
         rig: The model; `rig.replace(...)` changes its values.
         case: Segments from `segment_case`.
@@ -104,6 +106,12 @@ def compare_case(
 
     Raises:
         RecordingError: A recording was segmented without its drive.
+
+    Examples:
+        >>> from jaxcam.recordings.against_model import compare_case
+        >>> found = compare_case(read_rig(DEMO_RIG / "rig.toml"), parts[:1])
+        >>> [(row.mode, f"{row.ratio:.0f}") for row in found.rows[:2]]  # rms / noise
+        [('flight', '2'), ('contact', '24')]
     """
     found = []
     for segments in case:

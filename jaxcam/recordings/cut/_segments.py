@@ -46,6 +46,7 @@ class Flight:
 
     @property
     def duration(self) -> float:
+        """Length of the flight (s)."""
         return self.stop.time - self.start.time
 
 
@@ -72,6 +73,7 @@ class Contact:
 
     @property
     def duration(self) -> float:
+        """Length of the contact (s)."""
         return self.stop.time - self.start.time
 
 
@@ -110,6 +112,7 @@ class Impacts:
 
     @property
     def count(self) -> int:
+        """Number of impacts."""
         return len(self.time)
 
     @property

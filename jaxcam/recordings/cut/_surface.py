@@ -90,6 +90,14 @@ def nominal_surface(rig: Rig) -> Surface:
 
     Returns:
         A [`jaxcam.recordings.cut.Surface`][].
+
+    Examples:
+        >>> from jaxcam.data import DEMO_RIG
+        >>> from jaxcam.recordings import read_rig
+        >>> from jaxcam.recordings.cut import nominal_surface
+        >>> surface = nominal_surface(read_rig(DEMO_RIG / "rig.toml"))
+        >>> surface.angle([0.0, np.pi]).round(4).tolist()  # rad, at two cam angles
+        [0.2527, 0.2859]
     """
     zero = jnp.zeros(len(_HARMONICS))
     sense = -1.0 if rig.cam_rotation == "clockwise" else 1.0

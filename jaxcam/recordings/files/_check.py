@@ -67,6 +67,16 @@ def check_channels(recording: Recording) -> None:
 
     Raises:
         RecordingError: A channel is constant, or an angle appears to be in degrees.
+
+    Examples:
+        >>> from jaxcam.recordings import Recording, RecordingError
+        >>> from jaxcam.recordings.files import check_channels
+        >>> stuck = Recording("run", 0.1 * np.arange(5), {"angle_rad": np.full(5, 0.3)})
+        >>> try:
+        ...     check_channels(stuck)
+        ... except RecordingError as error:
+        ...     print(str(error).partition(";")[0])
+        run: the channel `angle_rad` is 0.3 throughout
     """
     for name, samples in recording.channels.items():
         # A force or a reference may be constant, but the motion itself may not
@@ -94,6 +104,17 @@ def check_drive(recording: Recording) -> None:
     Raises:
         RecordingError: The speeds differ; the message names the unit suggested by the
             numbers.
+
+    Examples:
+        >>> from jaxcam.recordings import Recording, RecordingError
+        >>> from jaxcam.recordings.files import check_drive
+        >>> time = 1e-3 * np.arange(1000)
+        >>> degrees = {"cam_angle_rad": 573.0 * time}  # 573 degrees/s are 10 rad/s
+        >>> try:
+        ...     check_drive(Recording("run", time, degrees, nominal_speed=10.0))
+        ... except RecordingError as error:
+        ...     print(str(error).partition(";")[0])
+        run: `cam_angle_rad` looks like degrees
     """
     angle = recording.channels.get("cam_angle_rad")
     nominal = recording.nominal_speed
@@ -104,6 +125,12 @@ def check_drive(recording: Recording) -> None:
         angle = np.unwrap(angle)
     speed = float(angle[-1] - angle[0]) / recording.duration
     ratio = abs(speed) / nominal if nominal > 0 else np.inf
+    if abs(ratio - 1) <= _SPEED_TOLERANCE:
+        return
+    # in another unit, jumps from one revolution to the next are not recognised, but
+    # they leave the median step unchanged
+    step = float(np.median(np.diff(recording.channels["cam_angle_rad"])))
+    typical = abs(step) / recording.interval / nominal if nominal > 0 else np.inf
     looks = {
         180 / np.pi: f"`cam_angle_rad` looks like degrees; {_DEGREES}",
         1 / (2 * np.pi): "`cam_angle_rad` looks like turns; multiply it by 2 pi or "
@@ -112,13 +139,13 @@ def check_drive(recording: Recording) -> None:
         "`time_ms`",
     }
     for factor, sentence in looks.items():
-        if abs(ratio / factor - 1) < _SPEED_TOLERANCE:
+        near = (abs(one / factor - 1) < _SPEED_TOLERANCE for one in (ratio, typical))
+        if any(near):
             hint = sentence.format("cam_angle")
             raise RecordingError(f"{recording.name}: {hint}.")
-    if abs(ratio - 1) > _SPEED_TOLERANCE:
-        rpm = 30 / np.pi
-        raise RecordingError(
-            f"{recording.name}: the cam turns at {abs(speed) * rpm:.1f} rpm, but the "
-            f"file name gives {nominal * rpm:.1f} rpm; correct the name or the column "
-            f"`cam_angle_rad`."
-        )
+    rpm = 30 / np.pi
+    raise RecordingError(
+        f"{recording.name}: the cam turns at {abs(speed) * rpm:.1f} rpm, but the file "
+        f"name gives {nominal * rpm:.1f} rpm; correct the name or the column "
+        f"`cam_angle_rad`."
+    )

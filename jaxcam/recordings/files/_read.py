@@ -35,7 +35,7 @@ def read_recordings(
     columns: Columns | None = None,
     rate: float | None = None,
 ) -> tuple[Recording, ...]:
-    """Read every recording in one file.
+    r"""Read every recording in one file.
 
     The file is text (plain or gzip-compressed), `.mat`, `.xlsx` or `.parquet`.
     Column names end with the unit. Columns in `_deg`, `_rpm`, `_ms`, `_mm` and similar
@@ -63,6 +63,15 @@ def read_recordings(
 
     Raises:
         RecordingError: The file cannot be used; the message says how to fix it.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> from jaxcam.recordings.files import read_recordings
+        >>> rows = "time_s,height_mm\n0.0,10\n0.1,11\n0.2,12\n0.5,20\n0.6,21\n0.7,22\n"
+        >>> _ = Path("drops.csv").write_text(rows)
+        >>> pieces = read_recordings("drops.csv", gaps="split")
+        >>> [piece["height_m"].tolist() for piece in pieces]
+        [[0.01, 0.011, 0.012], [0.02, 0.021, 0.022]]
     """
     file = Path(file)
     chosen = read_columns(

@@ -60,6 +60,12 @@ def periods(states, period_tolerance: float = 1e-6, sizes=None) -> np.ndarray:
 
     Returns:
         Periods, shape `(motions,)`.
+
+    Examples:
+        >>> from jaxcam.sweeps.attractors import periods
+        >>> alternating, irregular = [1, 2] * 4, [3, 1, 4, 1, 5, 9, 2, 6]
+        >>> periods(np.array([alternating, irregular])[..., None]).tolist()
+        [2, 0]
     """
     states = np.asarray(states, dtype=float)
     lanes, keep, _ = states.shape
@@ -126,6 +132,16 @@ def label(
 
     Returns:
         The labels.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> from jaxcam.models import ImpactOscillator
+        >>> from jaxcam.sweeps.attractors import label
+        >>> section = sweeps.Stroboscopic(ImpactOscillator(omega=2.8, wall=-0.5))
+        >>> samples = section.sample(np.array([[-0.8, 1.0]]), turns=200, keep=8)
+        >>> found = label(samples)
+        >>> found.impacts.tolist(), found.turns.tolist()  # P(1,1)
+        ([1], [1])
     """
     turns = periods(samples.states, period_tolerance, sizes)
     index = np.maximum(turns, 1)[:, None] - 1

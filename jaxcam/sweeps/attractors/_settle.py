@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...parameters import pick
 from ..sections import AbstractSection, Samples, with_lanes
 from ._label import APERIODIC, label, Labels
 
@@ -37,7 +38,17 @@ def settle(
 
     Returns:
         Samples and labels.
+
+    Examples:
+        >>> from jaxcam import sweeps
+        >>> from jaxcam.sweeps.attractors import settle
+        >>> logistic = sweeps.Map(lambda x, p: p["mu"] * x * (1 - x), {"mu": 3.2})
+        >>> starts, mu = np.full((3, 1), 0.3), [2.8, 3.2, 3.9]
+        >>> _, labels = settle(logistic, starts, 200, 16, where="mu", values=mu)
+        >>> labels.turns.tolist()  # stable up to 3, period 2 up to 3.449, chaos at 3.9
+        [1, 2, 0]
     """
+    where = None if where is None else pick(where, section.system)
     values = None if values is None else np.asarray(values, dtype=float)
     samples = section.sample(states, turns, keep, where=where, values=values)
     report = progress or (lambda share: None)

@@ -15,8 +15,9 @@ def cluster(address: str, workers: int | None = None) -> Iterator[Executor]:
         jaxcam.sweeps.basins(system, grid, 100, executor=executor)
     ```
 
-    A lost worker is replaced, and its blocks are computed again. A script that calls
-    this function must be guarded by `if __name__ == "__main__":`.
+    A lost worker is replaced, and its blocks are computed again.
+    [Sweeps](../sweeps.md#long-computations) compares the ways to compute blocks. A
+    script that calls this function must be guarded by `if __name__ == "__main__":`.
 
     Args:
         address: "local" for single-threaded processes on this machine, which end with

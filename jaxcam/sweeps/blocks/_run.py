@@ -96,6 +96,20 @@ def run_blocks(
     Raises:
         ValueError: The folder contains data other than this sweep.
         RuntimeError: Workers were lost.
+
+    Examples:
+        >>> from jaxcam.sweeps.blocks import AbstractJob, run_blocks
+        >>> from jaxcam.sweeps.blocks import StoredVariable, StoreLayout
+        >>> times = {"time": StoredVariable(("drop",), (), float)}
+        >>> class Falls(AbstractJob):
+        ...     heights = np.array([0.5, 1.0, 2.0])
+        ...     layout = StoreLayout(3, 2, times, {}, {"sweep": "falls"})
+        ...     def work(self, block, before):
+        ...         part = self.heights[slice(*self.layout.bounds(block))]
+        ...         return lambda: {"time": np.sqrt(2 * part / 9.81)}
+        >>> store = run_blocks(Falls())
+        >>> store.dataset()["time"].values.round(3).tolist()
+        [0.319, 0.452, 0.639]
     """
     layout = job.layout
     store = Memory(layout) if out is None else OnDisk(out, layout, resume)

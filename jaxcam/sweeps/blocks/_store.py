@@ -46,9 +46,11 @@ class StoreLayout(NamedTuple):
 
     @property
     def blocks(self) -> int:
+        """Number of blocks."""
         return -(-self.units // self.block)
 
     def bounds(self, block: int) -> tuple[int, int]:
+        """Return the first unit of a block, and the one after its last."""
         return block * self.block, min((block + 1) * self.block, self.units)
 
 

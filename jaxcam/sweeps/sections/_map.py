@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from ...hybrid.codes import NOT_FINITE
 from ...hybrid.programs import program
+from ...parameters import pick
 from ._samples import BEHIND, Samples
 from ._section import AbstractSection
 
@@ -56,6 +57,7 @@ class Map(AbstractSection):
 
     def sample(self, states, turns, keep, *, where=None, values=None) -> Samples:
         states = np.asarray(states, dtype=float)
+        where = None if where is None else pick(where, self.system)
         lanes = len(states)
         arrays = jax.tree.map(lambda leaf: jnp.asarray(leaf, float), self.system)
         given = None if values is None else jnp.asarray(np.asarray(values, float))

@@ -34,7 +34,7 @@ class AbstractSection(eqx.Module):
         turns: int,
         keep: int,
         *,
-        where: Callable | None = None,
+        where: Callable | str | None = None,
         values=None,
     ) -> Samples:
         """Return the last `keep` points within `turns` periods.
@@ -43,7 +43,7 @@ class AbstractSection(eqx.Module):
             states: Initial state of each motion, shape `(motions, n)`.
             turns: Number of periods.
             keep: Number of points.
-            where: Selects one or more parameters.
+            where: Selects one or more parameters: `lambda s: s.speed`, or `"speed"`.
             values: Value of the parameter of each motion, shape `(motions,)`, or one
                 row of values per motion.
 
