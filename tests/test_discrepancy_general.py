@@ -126,6 +126,8 @@ def test_damping_is_named_with_its_strength():
         "effects",
         "alternatives",
         "missing",
+        "differing",
+        "location",
         "fit",
         "rig",
         "summary",
@@ -171,7 +173,7 @@ def test_a_term_in_doubt_is_named_where_nothing_else_explains_what_is_left(monke
         names = [(name, 0.6) for name in best.names]
         return trials.known[frozenset()], {}, {}, names
 
-    monkeypatch.setattr("jaxcam.discrepancy.evidence._choice.sure", doubting)
+    monkeypatch.setattr("jaxcam.discrepancy.evidence._supported.sure", doubting)
     found = _diagnosed([_free(0.3, 0.1), _free(0.2, 0.1)])
     assert (found.verdict, found.names) == ("effect", ("viscous_damping",))
     (said,) = (c for c in found.caveats if c.reason is Reason.NAMED_IN_DOUBT)

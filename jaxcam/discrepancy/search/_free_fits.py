@@ -106,7 +106,7 @@ class FreeFits:
                 free=free,
                 start=point,
                 iterations=iterations or policy.quick_iterations,
-                stop=self._stop(problem.samples, heat, beaten),
+                stop=self._stop(problem.samples, beaten),
                 tolerance=_TOLERANCE * heat,
             )
             point, before, heat = found.point, heat, heat_of(found)
@@ -138,9 +138,7 @@ class FreeFits:
         subset = Subset(found.problem, found.functions, found.names)
         return found._replace(fit=again, score=self.score(subset, again))
 
-    def _stop(
-        self, samples: int, heat: float, beaten: float
-    ) -> Callable[[Sequence[float]], bool]:
+    def _stop(self, samples: int, beaten: float) -> Callable[[Sequence[float]], bool]:
         """Return a function that stops a fit if it has failed, or if its last steps
         gained too little to affect a choice.
         """
@@ -148,6 +146,7 @@ class FreeFits:
 
         def stop(costs: Sequence[float]) -> bool:
             steps = list(dict.fromkeys(costs))
+            heat = max(1.0, costs[-1] / samples)
             few = len(steps) > 3 and steps[-3] - steps[-1] < heat
             return gives_up(costs) or few
 

@@ -1,14 +1,13 @@
 """Choose the prior of a free function by its marginal likelihood."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from ...fitting.engine import invert_information
 from ..policy import Policy
-from ..terms import Family
 
 
 class Roughness(NamedTuple):
@@ -24,12 +23,26 @@ class Roughness(NamedTuple):
     size: float = 1.0
 
 
+@runtime_checkable
+class Varied(Protocol):
+    """A function, of one argument or several, with a prior of given length."""
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the function has a coefficient for its jump at zero velocity."""
+        ...
+
+    def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
+        """Return the variances of the coefficients of a function of variance one."""
+        ...
+
+
 def roughness(
     information,
     score,
     free,
     own,
-    family: Family,
+    family: Varied,
     value: Float[np.ndarray, " k"],
     policy: Policy,
 ) -> Roughness:

@@ -161,7 +161,7 @@ def likelihood_of(nodes: Nodes, surface: Surface, policy: Policy) -> SurfaceLike
     """Return the likelihood of a surface about the point of a response."""
     quadratic = nodes.quadratic(surface.basis(nodes))
     # the last coefficients are padding
-    rough = roughness(*quadratic, surface, np.zeros(_WIDTH), policy)  # pyright: ignore
+    rough = roughness(*quadratic, surface, np.zeros(_WIDTH), policy)
     inside, pull = beside(*quadratic, policy.distinct_information)
     used = int(np.prod(surface.shape))
     shape = surface.shape
