@@ -1,6 +1,7 @@
 """The report of a diagnosis: complete in itself, the sentence first."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -26,7 +27,7 @@ from jaxcam.discrepancy.report import (
     Reason,
     spelled,
 )
-from jaxcam.discrepancy.report._alternatives import _not_added
+from jaxcam.discrepancy.report._alternatives import _not_added, explains_less
 from jaxcam.discrepancy.terms import shapes, unit_along, Value, Variable
 from jaxcam.fitting import Residuals
 
@@ -226,10 +227,46 @@ def test_the_ranking_separates_better_and_worse_explanations():
 
 
 def test_an_addition_that_fits_better_states_why_it_is_not_named():
-    assert "required), but the term is doubtful" in _not_added(50.0, 10.0, True, True)
-    assert "but the bootstrap tests only" in _not_added(50.0, 10.0, True, False)
-    assert "but this is a prediction" in _not_added(50.0, 10.0, False, False)
-    assert _not_added(3.0, 10.0, True, False).endswith("where 10 is required")
+    doubtful = _not_added(50.0, 10.0, 1, True, True)
+    assert "required), but the term is doubtful" in doubtful
+    assert "but the bootstrap tests only" in _not_added(50.0, 10.0, 1, True, False)
+    assert "but this is a prediction" in _not_added(50.0, 10.0, 1, False, False)
+
+
+def test_a_term_that_is_not_significant_states_its_size_and_the_size_required():
+    """With one strength, the gain is the square of its significance."""
+    one = _not_added(1.44, 9.0, 1, False, False)
+    assert "its strength is 1.2 standard errors, and 3 are required" in one
+    # a strength of the wrong sign is zero
+    assert "is 0 standard errors" in _not_added(-0.5, 9.0, 1, False, False)
+    three = _not_added(6.88, 30.1, 3, True, False)
+    assert "by 6.88, and 30.1 is required for 3 parameters" in three
+
+
+def test_an_explanation_that_explains_less_states_its_share_of_the_misfit():
+    """Of the costs 500 to 100 of 100 samples, one that leaves 400 explains 25 %."""
+    textbook, best = (
+        SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=100))
+        for cost in (500.0, 100.0)
+    )
+    for cost, words in ((400.0, "25.0%"), (499.9, "none"), (100.1, "almost all")):
+        reason = explains_less(textbook, SimpleNamespace(cost=cost), best)
+        assert reason.startswith(f"explains {words} of what the verdict explains")
+    half = explains_less(textbook, SimpleNamespace(cost=400.0), best)
+    assert half.endswith("its residual is 2 times the noise, that of the verdict 1")
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_each_effect_has_its_own_gain():
+    """The residual if it alone is removed, and one gain for all effects together."""
+    other = dataclasses.replace(EFFECT, name="coulomb_friction", rms_without=1.37)
+    fit = SimpleNamespace(cost=98.0, problem=SimpleNamespace(samples=100))
+    found = _diagnosis("effect", (dataclasses.replace(EFFECT, rms_without=4.2), other))
+    page = diagnosis_page(dataclasses.replace(found, after=fit), (), ())
+    assert ">4.2</td>" in page and ">1.37</td>" in page
+    assert "it is 0.99 with all effects" in page
+    assert "log-likelihood of held-out data by 40" in page
+    assert other.to_json()["evidence"]["rms_without"] == 1.37
 
 
 def test_every_shape_has_a_quantity_whose_unit_is_known():

@@ -37,8 +37,8 @@ def test_speeds_at_impacts_are_not_biased(per_period, scale):
     assert impacts.count >= 28
     for speed in (impacts.approach, impacts.separation):
         error = scale * speed / APPROACH - 1
-        # the standard errors are 0.3 to 1 %, and the stretch that a polynomial is thought
-        # to follow may leave an error of the same size
+        # the standard errors are 0.3 to 1 %; what a polynomial that is thought to
+        # follow the motion misses may be as large
         assert abs(np.median(error)) < 0.012
         assert np.sqrt(np.mean(error**2)) < 0.03
     # the rough coefficient of restitution is that of the stop
