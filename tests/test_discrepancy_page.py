@@ -2,6 +2,7 @@
 
 import dataclasses
 from types import SimpleNamespace
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -243,16 +244,18 @@ def test_a_term_that_is_not_significant_states_its_size_and_the_size_required():
     assert "by 6.88, and 30.1 is required for 3 parameters" in three
 
 
+@pytest.mark.usefixtures("unchecked_types")
 def test_an_explanation_that_explains_less_states_its_share_of_the_misfit():
     """Of the costs 500 to 100 of 100 samples, one that leaves 400 explains 25 %."""
-    textbook, best = (
-        SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=100))
-        for cost in (500.0, 100.0)
-    )
+
+    def fit(cost) -> Any:
+        return SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=100))
+
+    textbook, best = fit(500.0), fit(100.0)
     for cost, words in ((400.0, "25.0%"), (499.9, "none"), (100.1, "almost all")):
-        reason = explains_less(textbook, SimpleNamespace(cost=cost), best)
+        reason = explains_less(textbook, fit(cost), best)
         assert reason.startswith(f"explains {words} of what the verdict explains")
-    half = explains_less(textbook, SimpleNamespace(cost=400.0), best)
+    half = explains_less(textbook, fit(400.0), best)
     assert half.endswith("its residual is 2 times the noise, that of the verdict 1")
 
 
@@ -260,7 +263,7 @@ def test_an_explanation_that_explains_less_states_its_share_of_the_misfit():
 def test_each_effect_has_its_own_gain():
     """The residual if it alone is removed, and one gain for all effects together."""
     other = dataclasses.replace(EFFECT, name="coulomb_friction", rms_without=1.37)
-    fit = SimpleNamespace(cost=98.0, problem=SimpleNamespace(samples=100))
+    fit: Any = SimpleNamespace(cost=98.0, problem=SimpleNamespace(samples=100))
     found = _diagnosis("effect", (dataclasses.replace(EFFECT, rms_without=4.2), other))
     page = diagnosis_page(dataclasses.replace(found, after=fit), (), ())
     assert ">4.2</td>" in page and ">1.37</td>" in page
