@@ -210,6 +210,29 @@ def test_only_significant_shapes_are_drawn():
 
 
 @pytest.mark.usefixtures("unchecked_types")
+def test_the_correction_shown_is_one_of_the_missing_effect():
+    """If the effects leave nothing significant, the correction of the textbook model in
+    the part of the motion in which they act, not the largest remainder.
+    """
+    found = _diagnosis("effect", (EFFECT,))
+    (small,) = found.left_after
+    drift = dataclasses.replace(small, name="drift", where="impact", variable="time")
+    found = dataclasses.replace(
+        found,
+        left_before=(
+            dataclasses.replace(small, gain=900.0),
+            dataclasses.replace(drift, gain=2000.0),
+        ),
+        left_after=(small, dataclasses.replace(drift, gain=20.0)),
+    )
+    figure = draw_shapes(plt, found)
+    (axis,) = figure.axes
+    assert axis.get_xlabel() == "position (rad)"
+    assert caption(found).startswith("No correction of the model with the missing")
+    plt.close(figure)
+
+
+@pytest.mark.usefixtures("unchecked_types")
 def test_the_ranking_separates_better_and_worse_explanations():
     """Bars on both sides of zero; a better one states why it was not named."""
     better = Alternative("sensor_lag", -2.8e5, ("sensor_lag",), "gains, but doubtful")

@@ -34,8 +34,9 @@ def constant_stops(
         for value in (np.min(values), np.max(values))
     )
     same = np.isclose(low, high, rtol=_SAME, atol=0.0)
+    nameless = len(low) == 1 and not system.constraint_names
     return {
-        system.constraint_name(int(number)): float(low[number])
+        "stop" if nameless else system.constraint_name(int(number)): float(low[number])
         for number in np.flatnonzero(same)
     }
 
