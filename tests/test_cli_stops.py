@@ -44,10 +44,11 @@ def test_a_stop_has_a_constant_position():
 
 def test_stops_of_models():
     values = np.array([2.0, 3.0])
-    (place,) = constant_stops(ImpactOscillator(wall=0.2), "omega", values, 2).values()
+    oscillator = ImpactOscillator(wall=0.2)  # pyright: ignore
+    (place,) = constant_stops(oscillator, "omega", values, 2).values()
     assert place == pytest.approx(0.2, rel=1e-12)
     assert constant_stops(CamFollower(), "speed", values, 2) == {}
-    moving = BouncingBall(amplitude=0.1)
+    moving = BouncingBall(amplitude=0.1)  # pyright: ignore
     assert constant_stops(moving, "frequency", values, 2) == {}
 
 
@@ -58,7 +59,7 @@ def test_stops_near_the_samples_are_drawn_and_named():
     (axis,) = figure.axes
     assert [one.get_text() for one in axis.texts] == ["wall"]
     (line,) = axis.lines
-    assert list(line.get_ydata()) == [0.9, 0.9]
+    assert np.asarray(line.get_ydata()).tolist() == [0.9, 0.9]
     low, high = axis.get_ylim()
     assert low < 0.5 and 0.9 < high < 1.2
     plt.close(figure)
