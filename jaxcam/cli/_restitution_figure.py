@@ -11,7 +11,7 @@ from jaxtyping import Float
 from ..discrepancy import Diagnosis
 from ..discrepancy.terms import Where
 from ..fitting import Fit
-from ..fitting.engine import state_size
+from ..fitting.engine import approach_speeds, state_size
 from ..hybrid.surface import restitutions
 from ..plotting.colours import IMPACT
 from ..plotting.labels import labelled
@@ -23,7 +23,7 @@ RESTITUTION = (
     "(dashed), and the model with the missing effects (line), each with a band of "
     "twice the standard error (a band that the line would hide is given as a number "
     "in the legend). The marks at the bottom are the approach speeds of the "
-    "recorded impacts; outside them, the law is extrapolated."
+    "recorded impacts, from the fitted flights; outside them, the law is extrapolated."
 )
 
 _SPEEDS = 60
@@ -94,9 +94,13 @@ def restitution(plt, found: Diagnosis):
 
 
 def _limits(curves) -> tuple[float, float]:
-    """Return limits of the vertical axis that contain all bands, with a margin."""
-    low = min(float(np.min(value - band)) for value, band in curves)
-    high = max(float(np.max(value + band)) for value, band in curves)
+    """Return limits of the vertical axis that contain all bands, with a margin.
+
+    A fit that is not sound has no band.
+    """
+    wide = [(value, np.where(np.isfinite(band), band, 0)) for value, band in curves]
+    low = min(float(np.min(value - band)) for value, band in wide)
+    high = max(float(np.max(value + band)) for value, band in wide)
     room = max(0.08 * (high - low), 1e-3 * max(abs(low), abs(high)))
     return low - room, high + room
 
@@ -110,9 +114,9 @@ def _unit(found: Diagnosis) -> str:
 
 def _speeds(found: Diagnosis) -> dict[int, Float[np.ndarray, " k"]]:
     """Return the approach speeds of the recorded impacts at each gap that has any."""
-    impacts = [part.impacts for part in found.after.problem.segments]
-    side = np.concatenate([one.side for one in impacts])
-    speed = np.concatenate([one.approach for one in impacts])
+    fit = found.after
+    side = np.concatenate([part.impacts.side for part in fit.problem.segments])
+    speed = np.concatenate(approach_speeds(fit.problem, fit.point))
     known = np.isfinite(speed) & (speed > 0)
     return {int(gap): speed[known & (side == gap)] for gap in np.unique(side[known])}
 

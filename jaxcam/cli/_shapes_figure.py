@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from ..discrepancy import Diagnosis
 from ..discrepancy.evidence import Structure
+from ..discrepancy.terms import Variable
 from ..plotting.colours import IMPACT
 from ..plotting.labels import labelled
 from ._changed import changed
@@ -19,6 +20,15 @@ class _Panel(NamedTuple):
 
     one: Structure
     textbook: Structure | None
+
+
+def has_shapes(found: Diagnosis) -> bool:
+    """Return whether a correction is significant, or shows the missing effects, or no
+    effect is missing.
+    """
+    if not (found.left_after and changed(found)):
+        return True
+    return any(one.significant for one in _drawn(found)) or bool(_relevant(found))
 
 
 def caption(found: Diagnosis) -> str:
@@ -111,7 +121,11 @@ def _relevant(found: Diagnosis) -> Structure | None:
     earlier = [
         one
         for one in found.left_before
-        if one.significant and one.where in acts and one.name in named
+        if one.significant
+        and one.where in acts
+        and one.name in named
+        # an effect changes with the motion, not with the time of the recording
+        and one.variable != Variable.TIME
     ]
     best = max(earlier, key=lambda one: one.gain, default=None)
     return None if best is None else named[best.name]
