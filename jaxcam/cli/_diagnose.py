@@ -85,7 +85,7 @@ def diagnose(
     from ._diagnose_files import write_diagnosis, write_verdict
     from ._output import Output
     from ._progress import progress
-    from ._read_summary import channels_of, read_summary
+    from ._read_summary import print_summary
 
     keep_compiled_programs()
     runs, nominal = read(case, rig, files, system)
@@ -93,8 +93,7 @@ def diagnose(
         _refuse_without_drive(nominal)
     output = Output(json_file, out)
     keep = _kept_fits(out, resume)
-    for sentence in read_summary(tuple(runs), channels_of(nominal)):
-        output.print(sentence)
+    print_summary(output, tuple(runs), nominal)
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
             nominal,

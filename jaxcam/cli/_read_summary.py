@@ -9,10 +9,19 @@ from ..fitting import cam_follower_model, Setup
 from ..recordings import Recording, Rig
 from ..recordings.files import unit_of
 from ..tables import counted
+from ._output import Output
 
 
 # maximum number of files that are all named
 _FEW = 3
+
+
+def print_summary(
+    output: Output, runs: Sequence[Recording], nominal: Rig | Setup
+) -> None:
+    """Print what was read."""
+    for sentence in read_summary(runs, channels_of(nominal)):
+        output.print(sentence)
 
 
 def channels_of(nominal: Rig | Setup) -> tuple[str, ...]:
