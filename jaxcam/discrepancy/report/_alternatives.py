@@ -167,7 +167,9 @@ def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
         return "explains as much: these recordings cannot distinguish between the two"
     if trial.bic < best.bic:
         return "fits better, but not all of its terms are certain"
-    return explains_less(choice.before.fit, trial.fit, best.fit)
+    # like the other subsets, with rig parameters that may leave their tolerances
+    textbook = trials.known[frozenset()].fit
+    return explains_less(textbook, trial.fit, best.fit)
 
 
 def explains_less(textbook: Fit, found: Fit, best: Fit) -> str:
