@@ -128,6 +128,8 @@ def test_damping_is_named_with_its_strength():
         "missing",
         "fit",
         "rig",
+        "differing",
+        "location",
         "summary",
     }
     assert written["effects"][0]["share"] > 0.99
