@@ -130,6 +130,8 @@ def test_damping_is_named_with_its_strength():
         "location",
         "fit",
         "rig",
+        "differing",
+        "location",
         "summary",
     }
     assert written["effects"][0]["share"] > 0.99
@@ -137,6 +139,9 @@ def test_damping_is_named_with_its_strength():
     named = {one.terms for one in found.alternatives}
     assert ("quadratic_drag", "viscous_damping") in named
     assert all(one.reason for one in found.alternatives)
+    # the textbook model explains nothing of what the effect explains
+    (none,) = (one for one in found.alternatives if one.name == "none")
+    assert none.reason.startswith("explains none of what the verdict explains")
     # the model that comes back is the one with damping
     field = found.model().system.vector_field(0.0, jnp.array([0.0, 1.0]))
     assert float(field[1]) == pytest.approx(-one.value)

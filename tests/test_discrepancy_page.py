@@ -1,6 +1,8 @@
 """The report of a diagnosis: complete in itself, the sentence first."""
 
 import dataclasses
+from types import SimpleNamespace
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -26,7 +28,7 @@ from jaxcam.discrepancy.report import (
     Reason,
     spelled,
 )
-from jaxcam.discrepancy.report._alternatives import _not_added
+from jaxcam.discrepancy.report._alternatives import _not_added, explains_less
 from jaxcam.discrepancy.terms import shapes, unit_along, Value, Variable
 from jaxcam.fitting import Residuals
 
@@ -130,7 +132,8 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
     page = diagnosis_page(found, figures, ("A note.",))
     assert page.index("The model lacks damping.") < page.index("<figure>")
     assert "&lt;nothing&gt;" in page
-    assert page.count("data:image/png;base64,") == 4
+    # a correction that is not significant does not show the missing effect
+    assert page.count("data:image/png;base64,") == (3 if effects else 4)
     # nothing is loaded from elsewhere
     assert "http" not in page.replace("http-equiv", "")
     assert "One caveat." in page
@@ -160,7 +163,7 @@ def test_the_page_says_why_nothing_is_predicted(tmp_path):
 def test_functions_without_a_name_are_drawn_and_written(tmp_path):
     found = dataclasses.replace(_diagnosis("unknown", ()), missing=FUNCTIONS)
     page = diagnosis_page(found, draw(tmp_path, found), ())
-    assert page.count("data:image/png;base64,") == 5
+    assert page.count("data:image/png;base64,") == 4
     first, second = found.to_json()["missing"]
     assert first["arguments"] == ["position"]
     assert len(first["table"]["value"]) == len(first["table"]["position"]) == 9
@@ -208,6 +211,29 @@ def test_only_significant_shapes_are_drawn():
 
 
 @pytest.mark.usefixtures("unchecked_types")
+def test_the_correction_shown_is_one_of_the_missing_effect():
+    """If the effects leave nothing significant, the correction of the textbook model in
+    the part of the motion in which they act, not the largest remainder.
+    """
+    found = _diagnosis("effect", (EFFECT,))
+    (small,) = found.left_after
+    drift = dataclasses.replace(small, name="drift", where="impact", variable="time")
+    found = dataclasses.replace(
+        found,
+        left_before=(
+            dataclasses.replace(small, gain=900.0),
+            dataclasses.replace(drift, gain=2000.0),
+        ),
+        left_after=(small, dataclasses.replace(drift, gain=20.0)),
+    )
+    figure = draw_shapes(plt, found)
+    (axis,) = figure.axes
+    assert axis.get_xlabel() == "position (rad)"
+    assert caption(found).startswith("No correction of the model with the missing")
+    plt.close(figure)
+
+
+@pytest.mark.usefixtures("unchecked_types")
 def test_the_ranking_separates_better_and_worse_explanations():
     """Bars on both sides of zero; a better one states why it was not named."""
     better = Alternative("sensor_lag", -2.8e5, ("sensor_lag",), "gains, but doubtful")
@@ -226,10 +252,48 @@ def test_the_ranking_separates_better_and_worse_explanations():
 
 
 def test_an_addition_that_fits_better_states_why_it_is_not_named():
-    assert "required), but the term is doubtful" in _not_added(50.0, 10.0, True, True)
-    assert "but the bootstrap tests only" in _not_added(50.0, 10.0, True, False)
-    assert "but this is a prediction" in _not_added(50.0, 10.0, False, False)
-    assert _not_added(3.0, 10.0, True, False).endswith("where 10 is required")
+    doubtful = _not_added(50.0, 10.0, 1, True, True)
+    assert "required), but the term is doubtful" in doubtful
+    assert "but the bootstrap tests only" in _not_added(50.0, 10.0, 1, True, False)
+    assert "but this is a prediction" in _not_added(50.0, 10.0, 1, False, False)
+
+
+def test_a_term_that_is_not_significant_states_its_size_and_the_size_required():
+    """With one strength, the gain is the square of its significance."""
+    one = _not_added(1.44, 9.0, 1, False, False)
+    assert "its strength is 1.2 standard errors, and 3 are required" in one
+    # a strength of the wrong sign is zero
+    assert "is 0 standard errors" in _not_added(-0.5, 9.0, 1, False, False)
+    three = _not_added(6.88, 30.1, 3, True, False)
+    assert "by 6.88, and 30.1 is required for 3 parameters" in three
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_an_explanation_that_explains_less_states_its_share_of_the_misfit():
+    """Of the costs 500 to 100 of 100 samples, one that leaves 400 explains 25 %."""
+
+    def fit(cost) -> Any:
+        return SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=100))
+
+    textbook, best = fit(500.0), fit(100.0)
+    for cost, words in ((400.0, "25.0%"), (499.9, "none"), (100.1, "almost all")):
+        reason = explains_less(textbook, fit(cost), best)
+        assert reason.startswith(f"explains {words} of what the verdict explains")
+    half = explains_less(textbook, fit(400.0), best)
+    assert half.endswith("its residual is 2 times the noise, that of the verdict 1")
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_each_effect_has_its_own_gain():
+    """The residual if it alone is removed, and one gain for all effects together."""
+    other = dataclasses.replace(EFFECT, name="coulomb_friction", rms_without=1.37)
+    fit: Any = SimpleNamespace(cost=98.0, problem=SimpleNamespace(samples=100))
+    found = _diagnosis("effect", (dataclasses.replace(EFFECT, rms_without=4.2), other))
+    page = diagnosis_page(dataclasses.replace(found, after=fit), (), ())
+    assert ">4.2</td>" in page and ">1.37</td>" in page
+    assert "it is 0.99 with all effects" in page
+    assert "log-likelihood of held-out data by 40" in page
+    assert other.to_json()["evidence"]["rms_without"] == 1.37
 
 
 def test_every_shape_has_a_quantity_whose_unit_is_known():

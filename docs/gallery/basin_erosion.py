@@ -19,10 +19,12 @@ large = found.shares.max(axis=0) > 0.03
 names = found.names[found.shares.argmax(axis=0), np.arange(len(large))]
 bands = [*found.shares.T[large], found.shares.T[~large].sum(axis=0)]
 words = [*names[large], "others"]
+colours = [*(f"C{k}" for k in range(large.sum())), "0.6"]
 
 with style():
     figure, ax = plt.subplots()
-    ax.stackplot(found.values, *(100 * np.array(bands)), labels=words, alpha=0.85)
+    shown = 100 * np.array(bands)
+    ax.stackplot(found.values, shown, labels=words, colors=colours, alpha=0.85)
     ax.set(xlabel="position of the wall (–)", ylabel="fraction of states (%)")
     ax.set(xlim=(0.0, 0.4), ylim=(0, 100))
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3)

@@ -1,5 +1,6 @@
 """Bifurcation diagram of an impact oscillator as a function of the forcing frequency:
-periodic windows, period doublings and chaos; darker regions contain more states."""
+periodic windows, period doublings and chaos; darker regions contain more states, and
+the thin line is the wall."""
 
 import numpy as np
 
@@ -17,4 +18,6 @@ made = sweeps.diagram(
     turns=300,
     keep=100,
 )
-figure = sweep_diagram(made, x_label=("frequency", "–"))
+figure = sweep_diagram(
+    made, x_label=("frequency", "–"), stops={"wall": float(system.wall)}
+)

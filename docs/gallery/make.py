@@ -21,6 +21,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 
+import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -123,6 +124,7 @@ def _save(figure: Figure, path: str) -> None:
 def _write_both(figure: Figure, path: Path) -> None:
     _write(figure, path.with_name(f"{path.name}-light.png"))
     _write(on_dark(figure), path.with_name(f"{path.name}-dark.png"))
+    plt.close(figure)
 
 
 def _write(figure: Figure, path: Path) -> None:

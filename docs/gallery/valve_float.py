@@ -29,19 +29,12 @@ with style():
     for share in (0.7, 1.0, 1.3):
         moved = eqx.tree_at(lambda s: s.speed, valve, jnp.asarray(share * limit))
         force = np.asarray(contact_load(moved, angles))
-        (line,) = ax.plot(np.rad2deg(angles), force)
-        place = np.argmax(force[:360])
         label = f"{moved.speed * 30 / np.pi:.0f} rpm"
-        ax.annotate(
-            label,
-            (np.rad2deg(angles[place]), force[place]),
-            (4, 4),
-            textcoords="offset points",
-            color=line.get_color(),
-        )
+        ax.plot(np.rad2deg(angles), force, label=label)
         pulls = np.rad2deg(angles), force, 0, force < 0
         ax.fill_between(*pulls, color=IMPACT, alpha=0.3)
     ax.axhline(0, color="0.3", lw=0.8)
     ax.margins(y=0.12)
     ax.set(xlabel="cam angle (degrees)", ylabel="contact force (N)", xlim=(0, 360))
     ax.set_xticks(np.arange(0, 361, 45))
+    ax.legend(loc="upper center")

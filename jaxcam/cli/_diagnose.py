@@ -85,13 +85,13 @@ def diagnose(
     from ._diagnose_files import write_diagnosis, write_verdict
     from ._output import Output
     from ._progress import progress
+    from ._read_summary import print_summary
 
     keep_compiled_programs()
     runs, nominal = read(case, rig, files, system)
-    if propose:
-        _refuse_without_drive(nominal)
-    output = Output(json_file, out)
-    keep = _kept_fits(out, resume)
+    _refuse_without_drive(nominal, propose)
+    output, keep = Output(json_file, out), _kept_fits(out, resume)
+    print_summary(output, tuple(runs), nominal)
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
             nominal,
@@ -120,11 +120,13 @@ def diagnose(
         raise failure
 
 
-def _refuse_without_drive(nominal) -> None:
-    """Raise `ValueError` if the rig has no rotating drive, whose speed is proposed."""
+def _refuse_without_drive(nominal, propose: bool) -> None:
+    """Raise `ValueError` if a speed is to be proposed, and the rig has no rotating
+    drive.
+    """
     from ..fitting import Setup
 
-    if isinstance(nominal, Setup) and nominal.drive_channel is None:
+    if propose and isinstance(nominal, Setup) and nominal.drive_channel is None:
         raise ValueError(
             "--next recommends a drive speed, but this rig has no rotating drive; "
             "leave --next out, and pass simulated recordings to "

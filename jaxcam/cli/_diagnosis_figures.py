@@ -14,7 +14,7 @@ from ._changed import changed
 from ._ranking_figure import RANKING, ranking
 from ._residual_axes import Along, residual_label, shown_in, sides, title_of
 from ._restitution_figure import has_law, RESTITUTION, restitution
-from ._shapes_figure import caption, shapes
+from ._shapes_figure import caption, has_shapes, shapes
 
 
 matplotlib.use("Agg")
@@ -41,11 +41,15 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
         if has_law(found):
             law = save_figure(restitution(plt, found), folder / "restitution.png")
             functions.append((law, RESTITUTION))
+        left = []
+        if has_shapes(found):
+            drawn = save_figure(shapes(plt, found), folder / "shapes.png")
+            left.append((drawn, caption(found)))
         return [
             *functions,
             (save_figure(_unseen(plt, found), folder / "unseen.png"), unseen),
             (save_figure(_maps(plt, found), folder / "maps.png"), maps),
-            (save_figure(shapes(plt, found), folder / "shapes.png"), caption(found)),
+            *left,
             (save_figure(ranking(plt, found), folder / "ranking.png"), RANKING),
         ]
 

@@ -74,8 +74,8 @@ def _effects(found: Diagnosis) -> list[str]:
         "parameters",
         "where",
         "fraction of the misfit",
+        "residual / noise without it",
         "delta BIC",
-        "gain in held-out ln L",
         "bootstrap inclusion",
     )
     rows = [
@@ -87,8 +87,8 @@ def _effects(found: Diagnosis) -> list[str]:
             ),
             effect.where,
             "" if effect.share is None else f"{effect.share:.1%}",
+            "" if effect.rms_without is None else f"{effect.rms_without:.3g}",
             f"{effect.delta_bic:.0f}",
-            f"{effect.heldout_gain_nats:.0f}",
             "" if effect.inclusion is None else f"{effect.inclusion:.0%}",
         )
         for effect in found.effects
@@ -96,8 +96,24 @@ def _effects(found: Diagnosis) -> list[str]:
     return [
         "<h2>Missing physics</h2>",
         table_html(headings, rows, text=(0, 1, 2)),
+        *_own_gains(found),
         *_per_mass(found),
         *_knockoffs(found),
+    ]
+
+
+def _own_gains(found: Diagnosis) -> list[str]:
+    """Explain the evidence for each effect, and state that for all of them."""
+    if not any(effect.rms_without is not None for effect in found.effects):
+        return []
+    gain = max(effect.heldout_gain_nats for effect in found.effects)
+    with_all = math.sqrt(found.after.cost / found.after.problem.samples)
+    return [
+        '<p class="note">The residual / noise is the rms residual of all samples if '
+        "this effect alone is removed and everything else is fitted again, in units "
+        f"of the sensor noise; it is {with_all:.3g} with all effects. Delta BIC is the "
+        "BIC with the effect minus that without it. Together, the effects increase "
+        f"the log-likelihood of held-out data by {gain:.3g}.</p>"
     ]
 
 
@@ -170,7 +186,7 @@ def _alternatives(found: Diagnosis) -> list[str]:
     ]
     return [
         "<h2>Other explanations</h2>",
-        table_html(("terms", "delta BIC", "reason for rejection"), rows, text=(0, 2)),
+        table_html(("terms", "delta BIC", "why it was not named"), rows, text=(0, 2)),
         '<p class="note">Delta BIC is the BIC of each explanation minus that of the '
         "verdict.</p>",
     ]

@@ -89,7 +89,7 @@ def diagram(
         figures = []
         if out is not None:
             report("drawing", None)
-            figures = [_draw(made, axis, sweep.section, out)]
+            figures = [_draw(made, model, axis, sweep.section, out)]
     ranges = made.ranges()
     if words:
         output.print(words)
@@ -153,10 +153,16 @@ def _table(ranges, axis: Axis):
     return table
 
 
-def _draw(made, axis: Axis, section: str, folder: Path) -> Path:
+def _draw(made, model, axis: Axis, section: str, folder: Path) -> Path:
     from ..plotting import save_figure, sweep_diagram
+    from ._stops import constant_stops
 
+    impacts = section == "impacts"
+    stops = {}
+    if not impacts:
+        size = made.states.shape[-1]
+        stops = constant_stops(model, made.parameter, made.values, size)
     figure = sweep_diagram(
-        made, phase=section == "impacts", x_label=axis.label, x_scale=1 / axis.unit
+        made, phase=impacts, x_label=axis.label, x_scale=1 / axis.unit, stops=stops
     )
     return save_figure(figure, folder / "diagram.png")

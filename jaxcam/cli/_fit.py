@@ -82,9 +82,11 @@ def fit(
     from ._fit_result import fitted, print_fit
     from ._output import Output
     from ._progress import progress
+    from ._read_summary import print_summary
 
     runs, nominal = read(case, rig, files, system)
     output = Output(json_file, out)
+    print_summary(output, tuple(runs), nominal)
     with progress("finding impacts and contacts") as report:
         found = fitted(runs, nominal, bootstrap, iterations, report)
         figures = []

@@ -50,6 +50,7 @@ th, td { padding: .4rem .6rem; text-align: right; white-space: nowrap;
 th { color: var(--quiet); font-weight: 600; white-space: normal; }
 .text { text-align: left; }
 td.text:last-child { white-space: normal; min-width: 18rem; }
+.many td.text { white-space: normal; }
 figure { margin: 1.8rem 0; }
 img { display: block; max-width: 100%; height: auto; }
 figcaption, .note { color: var(--quiet); font-size: .92rem; margin-top: .4rem; }

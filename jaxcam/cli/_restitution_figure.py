@@ -11,7 +11,7 @@ from jaxtyping import Float
 from ..discrepancy import Diagnosis
 from ..discrepancy.terms import Where
 from ..fitting import Fit
-from ..fitting.engine import state_size
+from ..fitting.engine import approach_speeds, state_size
 from ..hybrid.surface import restitutions
 from ..plotting.colours import IMPACT
 from ..plotting.labels import labelled
@@ -21,12 +21,20 @@ from ..recordings.files import unit_of
 RESTITUTION = (
     "Coefficient of restitution against approach speed: the textbook model, refitted "
     "(dashed), and the model with the missing effects (line), each with a band of "
-    "twice the standard error. The marks at the bottom are the approach speeds of the "
-    "recorded impacts; outside them, the law is extrapolated."
+    "twice the standard error (a band that the line would hide is given as a number "
+    "in the legend). The marks at the bottom are the approach speeds of the "
+    "recorded impacts, from the fitted flights; outside them, the law is extrapolated."
 )
 
 _SPEEDS = 60
-_TEXTBOOK = "0.45"
+# colour, line and label of both models
+_LINES = (
+    ("0.45", "--", "textbook model"),
+    (IMPACT, "-", "with the missing effects"),
+)
+# half width of a band, relative to the axis, that is as wide as the line: 0.8 points of
+# about 170
+_VISIBLE = 0.8 / 170
 
 
 class _Law(NamedTuple):
@@ -59,28 +67,42 @@ def restitution(plt, found: Diagnosis):
     unit = _unit(found)
     name = found.system().constraint_name
     for axis, gap in zip(axes.flat, shown):
-        for law, color, line, label in zip(
-            laws,
-            (_TEXTBOOK, IMPACT),
-            ("--", "-"),
-            ("textbook model", "with the missing effects"),
-        ):
-            value, band = law.value[:, gap], 2 * law.stderr[:, gap]
+        axis.set_xlim(0, 1.02 * np.max(recorded[gap]))
+        curves = [(law.value[:, gap], 2 * law.stderr[:, gap]) for law in laws]
+        low, high = _limits(curves)
+        axis.set_ylim(low, high)
+        for (value, band), (color, line, label) in zip(curves, _LINES):
+            hidden = np.max(band) < _VISIBLE * (high - low)
+            if hidden:
+                label += f" ± {np.max(band):.1g}"
             axis.fill_between(
-                along, value - band, value + band, color=color, alpha=0.25, lw=0
+                along, value - band, value + band, color=color, alpha=0.3, lw=0
             )
+            for edge in () if hidden else (value - band, value + band):
+                axis.plot(along, edge, color=color, lw=0.6, alpha=0.8)
             axis.plot(along, value, line, color=color, label=label)
         axis.plot(
             recorded[gap], np.zeros_like(recorded[gap]), "|", color="k", ms=9,
             alpha=0.4, transform=axis.get_xaxis_transform(), label="recorded impacts",
         )  # fmt: skip
-        axis.set_xlim(0, 1.02 * np.max(recorded[gap]))
         axis.set_xlabel(labelled("approach speed", unit))
         if len(recorded) > 1:
             axis.set_title(name(gap))
+        axis.legend(fontsize="small")
     axes[0, 0].set_ylabel("coefficient of restitution")
-    axes[0, 0].legend(fontsize="small")
     return figure
+
+
+def _limits(curves) -> tuple[float, float]:
+    """Return limits of the vertical axis that contain all bands, with a margin.
+
+    A fit that is not sound has no band.
+    """
+    wide = [(value, np.where(np.isfinite(band), band, 0)) for value, band in curves]
+    low = min(float(np.min(value - band)) for value, band in wide)
+    high = max(float(np.max(value + band)) for value, band in wide)
+    room = max(0.08 * (high - low), 1e-3 * max(abs(low), abs(high)))
+    return low - room, high + room
 
 
 def _unit(found: Diagnosis) -> str:
@@ -92,9 +114,9 @@ def _unit(found: Diagnosis) -> str:
 
 def _speeds(found: Diagnosis) -> dict[int, Float[np.ndarray, " k"]]:
     """Return the approach speeds of the recorded impacts at each gap that has any."""
-    impacts = [part.impacts for part in found.after.problem.segments]
-    side = np.concatenate([one.side for one in impacts])
-    speed = np.concatenate([one.approach for one in impacts])
+    fit = found.after
+    side = np.concatenate([part.impacts.side for part in fit.problem.segments])
+    speed = np.concatenate(approach_speeds(fit.problem, fit.point))
     known = np.isfinite(speed) & (speed > 0)
     return {int(gap): speed[known & (side == gap)] for gap in np.unique(side[known])}
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from ..discrepancy import Diagnosis
 from ..discrepancy.evidence import Structure
+from ..discrepancy.terms import Variable
 from ..plotting.colours import IMPACT
 from ..plotting.labels import labelled
 from ._changed import changed
@@ -21,12 +22,27 @@ class _Panel(NamedTuple):
     textbook: Structure | None
 
 
+def has_shapes(found: Diagnosis) -> bool:
+    """Return whether a correction is significant, or shows the missing effects, or no
+    effect is missing.
+    """
+    if not (found.left_after and changed(found)):
+        return True
+    return any(one.significant for one in _drawn(found)) or bool(_relevant(found))
+
+
 def caption(found: Diagnosis) -> str:
     """Return the caption of the figure."""
     after = changed(found) and bool(found.left_after)
     model = "the model with the missing effects" if after else "the textbook model"
     panels = _panels(found)
-    if not any(panel.one.significant for panel in panels):
+    if _relevant(found) is not None:
+        start = (
+            f"No correction of {model} is significant. The one shown was the largest "
+            "of the textbook model in the part of the motion in which the missing "
+            "effects act."
+        )
+    elif not any(panel.one.significant for panel in panels):
         start = f"The largest correction of {model}; it is not significant."
     elif len(panels) == 1:
         start = f"The only significant correction of {model}."
@@ -73,15 +89,46 @@ def shapes(plt, found: Diagnosis):
 
 
 def _panels(found: Diagnosis) -> list[_Panel]:
-    """Return the significant corrections, or the largest one if none is significant."""
-    final = found.left_after or found.left_before
-    drawn = [one for one in final if len(one.grid)]
-    drawn.sort(key=lambda one: one.gain - one.threshold, reverse=True)
+    """Return the significant corrections; if there are none, the one that shows the
+    missing effects in the textbook model, or the largest one.
+    """
+    drawn = _drawn(found)
+    relevant = _relevant(found)
     kept = [one for one in drawn if one.significant][:_MOST] or drawn[:1]
+    kept = kept if relevant is None else [relevant]
     textbook = {}
     if found.left_after and changed(found):
         textbook = {one.name: one for one in found.left_before if len(one.grid)}
     return [_Panel(one, textbook.get(one.name)) for one in kept]
+
+
+def _drawn(found: Diagnosis) -> list[Structure]:
+    """Return the corrections that can be drawn, the most significant first."""
+    final = found.left_after or found.left_before
+    drawn = [one for one in final if len(one.grid)]
+    return sorted(drawn, key=lambda one: one.gain - one.threshold, reverse=True)
+
+
+def _relevant(found: Diagnosis) -> Structure | None:
+    """Return the correction whose value in the textbook model shows the missing effects
+    best, if the effects leave no significant correction.
+    """
+    drawn = _drawn(found)
+    if not found.left_after or any(one.significant for one in drawn):
+        return None
+    named = {one.name: one for one in drawn}
+    acts = {effect.where for effect in found.effects if effect.term}
+    earlier = [
+        one
+        for one in found.left_before
+        if one.significant
+        and one.where in acts
+        and one.name in named
+        # an effect changes with the motion, not with the time of the recording
+        and one.variable != Variable.TIME
+    ]
+    best = max(earlier, key=lambda one: one.gain, default=None)
+    return None if best is None else named[best.name]
 
 
 def _draw(axis, panel: _Panel) -> None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ._axes import figure_of, legend_above, one_axes
 from ._branch_lines import lines_of
 from ._clear_labels import Label, place_labels
-from ._style import FLIGHT, IMPACT, SECTION, styled
+from ._style import CAM, FLIGHT, IMPACT, PURPLE, SECOND, SECTION, SKY, styled
 from .labels import labelled
 
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 # marker and colour of each kind of special point, in all figures
 _MARKS = {
     "fold": ("o", IMPACT),
-    "flip": ("s", "#009E73"),
-    "Neimark-Sacker": ("D", "#CC79A7"),
+    "flip": ("s", SECOND),
+    "Neimark-Sacker": ("D", PURPLE),
     "branch point": ("P", SECTION),
-    "Hopf": ("H", "#56B4E9"),
-    "grazing": ("^", "#8A5F00"),
-    "interruption of chatter": ("*", "#CC79A7"),
-    "detachment": ("v", "#56B4E9"),
+    "Hopf": ("H", SKY),
+    "grazing": ("^", CAM),
+    "interruption of chatter": ("*", PURPLE),
+    "detachment": ("v", SKY),
 }
 _OTHER = ("X", SECTION)
 # shorter labels next to the markers, for kinds with a long name

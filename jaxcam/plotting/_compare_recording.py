@@ -80,15 +80,10 @@ def compare_recording(
         above.plot(over[keep], cam, color=CAM, linewidth=1.0, label="cam")
         floor = np.nanmin([np.nanmin(cam), samples[keep].min()])
         above.fill_between(over[keep], cam, floor, color=CAM, alpha=0.25, linewidth=0)
-    above.plot(
-        over[keep],
-        samples[keep],
-        # the line of the recording is wide and pale, so that it remains visible behind
-        # that of a simulation that coincides with it
-        color=RECORDED,
-        linewidth=4.5,
-        label="recorded",
-    )
+    # the line of the recording is wide, and pale between its edges, so that it remains
+    # visible behind that of a simulation that coincides with it
+    for colour, width, word in ((RECORDED, 4.8, "recorded"), (BAND, 3.4, "_inside")):
+        above.plot(over[keep], samples[keep], color=colour, linewidth=width, label=word)
     left_over = {name: samples - values for name, values in runs.items()}
     kept = np.concatenate([values[keep] for values in left_over.values()])
     name, unit = name_and_unit(channel)

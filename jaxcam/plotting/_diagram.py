@@ -1,5 +1,6 @@
 """Draw brute-force bifurcation diagrams, and charts in two parameters."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ._axes import clear_corner, figure_of, one_axes
-from ._style import FLIGHT, IMPACT, SECTION, styled
+from ._style import CAM, FLIGHT, IMPACT, SECTION, styled
 from .labels import labelled
 
 
@@ -45,6 +46,7 @@ def sweep_diagram(
     x_label: tuple[str, str] | None = None,
     y_label: tuple[str, str] | None = None,
     x_scale: float = 1.0,
+    stops: Mapping[str, float] | None = None,
 ) -> Figure:
     """Draw a bifurcation diagram, darker where there are many samples.
 
@@ -60,6 +62,8 @@ def sweep_diagram(
         x_label: Name and unit of the x-axis.
         y_label: Name and unit of the y-axis.
         x_scale: Factor applied to the parameter (30/pi for a speed in rpm).
+        stops: Positions of constraints in the coordinate of the y-axis, by name, each
+            drawn as a thin line; a stop far from all samples is omitted.
 
     Returns:
         The figure.
@@ -109,9 +113,31 @@ def sweep_diagram(
     # the dots at both ends are fully visible
     room = _ROOM * (high - low)
     ax.set_xlim(low - room, high + room)
+    _draw_stops(ax, {} if stops is None else stops, y[np.isfinite(y)])
     if handles:
         _above(ax, handles)
     return figure_of(ax)
+
+
+def _draw_stops(ax: Axes, stops: Mapping[str, float], y) -> None:
+    """Draw each stop that is no farther from the samples than they extend."""
+    if not y.size:
+        return
+    low, high = float(np.min(y)), float(np.max(y))
+    reach = high - low
+    for name, place in stops.items():
+        if not low - reach <= place <= high + reach:
+            continue
+        ax.axhline(place, color=CAM, lw=0.9, zorder=1)
+        # above the line unless the samples are there
+        below = place <= (low + high) / 2
+        ax.annotate(
+            name, (1.0, place), (-3, -2 if below else 2), ha="right",
+            va="top" if below else "bottom", xycoords=("axes fraction", "data"),
+            textcoords="offset points", fontsize="small", color=CAM,
+        )  # fmt: skip
+        # room for the name beyond the last sample
+        ax.margins(y=0.08)
 
 
 def _dot_size(ax: Axes, columns: int) -> float:

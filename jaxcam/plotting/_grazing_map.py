@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ._axes import figure_of, legend_above, one_axes
-from ._style import BAND, FLIGHT, IMPACT, styled
+from ._style import FLIGHT, IMPACT, RECORDED, styled
 
 
 @styled
@@ -61,7 +61,7 @@ def cobweb(
         # the slope is infinite at the edge
         grid = np.sort(np.append(grid, edge - (high - low) * np.logspace(-9, -3, 60)))
     ax = one_axes(ax)
-    ax.plot([low, high], [low, high], color=BAND, label="_identity")
+    ax.plot([low, high], [low, high], color=RECORDED, label="_identity")
     ax.plot(grid, np.asarray(function(grid)), color=FLIGHT, label="map")
     steps = np.repeat(points, 2)
     ax.plot(
@@ -69,7 +69,7 @@ def cobweb(
         label="orbit",
     )  # fmt: skip
     if edge is not None:
-        ax.axvline(edge, color=BAND, linestyle="--", linewidth=1.0, label="grazing")
+        ax.axvline(edge, color=RECORDED, linestyle="--", linewidth=1.0, label="grazing")
     ax.set_xlim(low, high)
     ax.set_ylim(low, high)
     ax.set_aspect("equal")

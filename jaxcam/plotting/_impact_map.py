@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..hybrid import Trajectory
 from ._axes import legend_above, several_axes
-from ._style import BAND, gap_colour, IMPACT, styled
+from ._style import gap_colour, IMPACT, RECORDED, styled
 from .curves import Hits, hits, window
 from .labels import labelled, speed_unit, time_unit
 
@@ -91,7 +91,7 @@ def impact_return_map(
 def _draw(ax: Axes, system, values, found: Hits, name: str, unit: str, limits) -> None:
     if limits is None:
         limits = _limits(values, ax.get_xscale() == "log")
-    ax.plot(limits, limits, color=BAND, linewidth=1.2, zorder=1, label="_identity")
+    ax.plot(limits, limits, color=RECORDED, linewidth=1.2, zorder=1, label="_identity")
     this, following = values[:-1], values[1:]
     kinds = np.unique(found.constraint)
     for k in kinds:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ._axes import figure_of, legend_above, one_axes
-from ._style import BAND, FLIGHT, IMPACT, styled
+from ._style import BAND, FLIGHT, IMPACT, RECORDED, styled
 
 
 @styled
@@ -37,7 +37,7 @@ def multipliers(
     if reach is None:
         reach = 1.15 * max(1.0, float(np.abs(values).max(initial=0.0)))
     turn = np.linspace(0, 2 * np.pi, 361)
-    ax.plot(np.cos(turn), np.sin(turn), color=BAND, zorder=1, label="unit circle")
+    ax.plot(np.cos(turn), np.sin(turn), color=RECORDED, zorder=1, label="unit circle")
     size = np.maximum(np.abs(np.real(values)), np.abs(np.imag(values)))
     outside = size > reach
     shown = np.where(

@@ -11,18 +11,21 @@ from matplotlib.figure import Figure
 
 _STYLE_FILE = Path(__file__).with_name("jaxcam.mplstyle")
 
-# Okabe-Ito colours, with their meaning in all figures
+# Okabe-Ito colours, with their meaning in all figures; orange and sky blue are darker
+# than in that palette, because lines and markers need a contrast of 3:1 to the page
 FLIGHT = "#0072B2"
 IMPACT = "#D55E00"
-CONTACT = "#E69F00"
+CONTACT = "#C27F00"
 SECTION = "#000000"
-RECORDED = "#ABABAB"
+RECORDED = "#8C8C8C"
 BAND = "#BDBDBD"
 CAM = "#8A5F00"
 # colour of a second item of the same kind, such as another method or manifold
 SECOND = "#009E73"
+PURPLE = "#CC79A7"
+SKY = "#2F8FC4"
 # colours of several constraints, different from those of impacts and contacts
-_GAPS = (FLIGHT, "#009E73", "#CC79A7", "#56B4E9", SECTION)
+_GAPS = (FLIGHT, SECOND, PURPLE, SKY, SECTION)
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
+from ...fitting import Fit
 from ..evidence import Choice, Rival
 from ..policy import Policy
 from ..search import added_gain, Missing, Trial, Trials
@@ -62,12 +63,13 @@ def alternatives_to_functions(
         for rival in rivals
     ]
     named = sorted(trials.known.values(), key=lambda trial: trial.bic)
+    textbook = trials.known[frozenset()].fit
     found += [
         Alternative(
             _name(trial),
             trial.bic - missing.score,
             _terms(trial),
-            "the named terms alone explain less than the function",
+            explains_less(textbook, trial.fit, missing.fit),
         )
         for trial in named[: policy.alternatives]
     ]
@@ -114,20 +116,35 @@ def _additions(trials: Trials, choice: Choice) -> Iterator[Alternative]:
                 information, score, free, own, trials.policy.distinct_information
             )
         asked = trials.threshold(term.name)
-        reason = _not_added(gain, asked, known is not None, term.name in dropped)
-        delta = trials.count([term.name]) * price - gain
+        number = trials.count([term.name])
+        reason = _not_added(
+            gain, asked, number, known is not None, term.name in dropped
+        )
+        delta = number * price - gain
         terms = tuple(sorted(names))
         yield Alternative("+".join(terms), delta, terms, reason)
 
 
-def _not_added(gain: float, asked: float, fitted: bool, dropped: bool) -> str:
+def _not_added(
+    gain: float, asked: float, number: int, fitted: bool, dropped: bool
+) -> str:
     """Return the reason why a term was not added, given its gain, the gain that is
-    required, and whether the term was fitted and then dropped.
+    required, the number of its strengths, and whether the term was fitted and then
+    dropped.
     """
+    gain = max(gain, 0.0)
+    if gain < asked and number == 1:
+        # with one strength, the gain is the square of its significance
+        return (
+            f"too small to be distinguished from noise: its strength is "
+            f"{math.sqrt(gain):.2g} standard errors, and {math.sqrt(asked):.2g} are "
+            f"required"
+        )
     if gain < asked:
         return (
-            f"would increase twice the log-likelihood by {max(gain, 0.0):.3g}, where "
-            f"{asked:.3g} is required"
+            f"too small to be distinguished from noise: twice the log-likelihood would "
+            f"increase by {gain:.3g}, and {asked:.3g} is required for {number} "
+            f"parameters"
         )
     if dropped:
         cause = "the term is doubtful (see the caveat)"
@@ -143,17 +160,30 @@ def _not_added(gain: float, asked: float, fitted: bool, dropped: bool) -> str:
 
 def _worse(trials: Trials, choice: Choice, trial: Trial) -> str:
     """Return the reason why a fitted subset is not the named one."""
-    best, samples = choice.named.best, trials.problem.samples
+    best = choice.named.best
     if not trials.settled(trial):
         return "its fit is poor"
     if abs(trial.bic - best.bic) < trials.policy.tie:
         return "explains as much: these recordings cannot distinguish between the two"
     if trial.bic < best.bic:
         return "fits better, but not all of its terms are certain"
-    return (
-        f"explains less: its cost per sample is {trial.fit.cost / samples:.4g}, "
-        f"compared with {best.fit.cost / samples:.4g} for the choice"
-    )
+    # like the other subsets, with rig parameters that may leave their tolerances
+    textbook = trials.known[frozenset()].fit
+    return explains_less(textbook, trial.fit, best.fit)
+
+
+def explains_less(textbook: Fit, found: Fit, best: Fit) -> str:
+    """Say how much of the misfit that the chosen fit explains another fit explains."""
+    whole = textbook.cost - best.cost
+    share = (textbook.cost - found.cost) / whole if whole > 0 else math.nan
+    samples = best.problem.samples
+    rms, least = (math.sqrt(one.cost / samples) for one in (found, best))
+    left = f"its residual is {rms:.3g} times the noise, that of the verdict {least:.3g}"
+    if not math.isfinite(share):
+        return f"explains less: {left}"
+    part = f"{max(share, 0.0):.1%}"
+    part = {"0.0%": "none", "100.0%": "almost all"}.get(part, part)
+    return f"explains {part} of what the verdict explains: {left}"
 
 
 def _name(trial: Trial) -> str:

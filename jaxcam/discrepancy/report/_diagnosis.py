@@ -74,7 +74,7 @@ class Effect:
     delta_bic: float
     """BIC with the effect minus BIC without it."""
     heldout_gain_nats: float
-    """Gain in the log-likelihood of held-out data."""
+    """Gain in the log-likelihood of held-out data, by all effects together."""
     inclusion: float | None
     """Share of the bootstrap samples in which it would be named; `None` for an unknown
     effect without a function."""
@@ -83,6 +83,10 @@ class Effect:
     share: float | None = None
     """Share of the misfit that it explains; for an unknown effect, the unexplained
     share. `None` for the drive, which is diagnosed from its own channel.
+    """
+    rms_without: float | None = None
+    """Rms residual, in units of the noise, if this effect alone is removed and the
+    others are fitted again; `None` if there is no such fit.
     """
 
     def to_json(self) -> dict[str, Any]:
@@ -101,6 +105,7 @@ class Effect:
                 "delta_bic": self.delta_bic,
                 "heldout_gain_nats": self.heldout_gain_nats,
                 "inclusion": self.inclusion,
+                "rms_without": self.rms_without,
             },
             "share": self.share,
         }

@@ -27,11 +27,13 @@ def term_effects(
     instead = {one.term: one.lost for one in choice.named.beyond if one.term}
     found = []
     for name in sorted(best.names, key=lambda name: (-share[name], name)):
-        less = trials.known.get(best.names - {name}, choice.before)
-        delta = best.bic - less.bic
+        without = trials.known.get(best.names - {name})
+        less = without or choice.before
+        delta, lost = best.bic - less.bic, less.fit.cost - best.fit.cost
         if name in instead:
             delta = trials.count([name]) * math.log(trials.problem.samples)
-            delta -= instead[name]
+            delta, lost = delta - instead[name], instead[name]
+        known = without is not None or name in instead
         found.append(
             _of_term(
                 trials.term(name),
@@ -43,9 +45,17 @@ def term_effects(
                 choice.named.inclusion[name],
                 trials.policy,
                 share[name],
+                _rms_without(best.fit, lost) if known else None,
             )
         )
     return found
+
+
+def _rms_without(best: Fit, lost: float) -> float:
+    """Return the rms residual without an effect, in units of the noise, given the
+    increase in the cost.
+    """
+    return math.sqrt((best.cost + max(lost, 0.0)) / best.problem.samples)
 
 
 def with_speed(effect: Effect, found: FittedSpeed | None) -> Effect:
@@ -91,6 +101,9 @@ def missing_effects(
         inclusion=min(needs.inclusion[label] for label in labels),
         term=False,
         share=sum(divided.of[label] for label in labels),
+        rms_without=_rms_without(fitted, needs.lost[labels[0]])
+        if len(labels) == 1
+        else None,
     )
     return [whole] + [
         _of_term(
@@ -103,6 +116,7 @@ def missing_effects(
             needs.inclusion[name],
             policy,
             divided.of[name],
+            _rms_without(fitted, needs.lost[name]),
         )
         for name in sorted(missing.names)
     ]
@@ -123,6 +137,7 @@ def _of_term(
     inclusion: float,
     policy: Policy,
     share: float,
+    rms_without: float | None,
 ) -> Effect:
     strengths = term.strengths()
     parameters = {
@@ -144,6 +159,7 @@ def _of_term(
         heldout_gain_nats=gained,
         inclusion=inclusion,
         share=share,
+        rms_without=rms_without,
     )
 
 

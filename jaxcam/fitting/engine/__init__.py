@@ -1,5 +1,6 @@
 """Build fitting problems from recordings and a model, and form the normal equations."""
 
+from ._approach_speeds import approach_speeds as approach_speeds
 from ._columns import (
     Columns as Columns,
     free_columns as free_columns,

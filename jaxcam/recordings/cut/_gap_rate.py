@@ -107,7 +107,9 @@ class GapRate:
         return self._line(rows, float(self.time[place]))
 
     def _line(self, rows: slice, origin: float) -> LocalFit:
-        return fit_local(self.time[rows], self.values[rows], self.noise, origin, most=1)
+        return fit_local(
+            self.time[rows], self.values[rows], self.noise, origin, degree=1
+        )
 
     @property
     def _window(self) -> int:

@@ -7,15 +7,20 @@ from jaxtyping import Float
 
 from ._gap_rate import GapRate
 from ._kinks import find_kinks, WINDOW
-from ._polynomial import fit_local, LocalFit
+from ._polynomial import fit_local, LocalFit, usual_degree
 
 
 # Longest stretch (s) that is fitted, and minimum number of samples when it is shortened
 _FIT_WINDOW, _FEWEST = 0.1, 16
-# Rms residual (in units of the noise) above which a cubic does not follow a stretch
+# Number of samples in the longest stretch below which a higher degree is tried before
+# the stretch is shortened: its highest degree, and minimum number of samples per
+# coefficient
+_MANY, _HIGHEST, _PER_COEFFICIENT = 100, 5, 2
+# Rms residual (in units of the noise) above which a polynomial does not follow a
+# stretch
 _FOLLOWED = 2.0
-# Coefficient of the next power, in standard errors, above which a cubic does not follow
-# the stretch either
+# Coefficient of the next power, in standard errors, above which a polynomial does not
+# follow the stretch either
 _NEXT = 2.0
 
 
@@ -61,22 +66,30 @@ class Motion:
         return sorted([*shown.tolist(), *others])
 
     def fit(self, first: int, last: int, *, at_end: bool) -> LocalFit:
-        """Fit a polynomial to one end of a flight, as far as a cubic can follow the
-        motion.
+        """Fit a polynomial to one end of a flight, as far as it can follow the motion.
+
+        A polynomial that does not follow the motion has the wrong slope at the end.
+        Therefore a stretch with many samples is shortened; one with few samples cannot
+        be shortened enough, and the degree is raised first.
         """
         # the samples next to an impact may belong to the other side
         inner = slice(first + 1, last - 1) if last - first > 6 else slice(first, last)
-        count = max(4, round(_FIT_WINDOW / self.interval))
+        count = max(_FEWEST, round(_FIT_WINDOW / self.interval))
+        few = count < _MANY
         every = np.arange(len(self.time))[inner]
         origin = float(self.time[min(last, len(self.time) - 1) if at_end else first])
         while True:
             rows = every[-count:] if at_end else every[:count]
             time, samples = self.time[rows], self.samples[rows]
-            found = fit_local(time, samples, self.noise, origin)
-            shorter = min(len(rows), round(0.7 * count))
-            if shorter < _FEWEST or self._follows(found, time, samples):
+            usual = usual_degree(len(rows))
+            most = min(_HIGHEST if few else 3, len(rows) // _PER_COEFFICIENT - 1)
+            for degree in range(usual, max(usual, most) + 1):
+                found = fit_local(time, samples, self.noise, origin, degree)
+                if self._follows(found, time, samples):
+                    return found
+            count = round(0.7 * len(rows))
+            if count < _FEWEST:
                 return found
-            count = shorter
 
     def _follows(self, fit: LocalFit, time, samples) -> bool:
         """Return whether a fit describes the samples, and a further power would not
@@ -85,7 +98,9 @@ class Motion:
         """
         off = samples - fit.values(time)
         degree = len(fit.coefficients)
-        free = max(1, len(time) - degree)
+        if degree >= len(time):
+            return True
+        free = len(time) - degree
         scale = max(float(np.max(np.abs(time - fit.origin))), np.finfo(float).tiny)
         powers = ((time - fit.origin) / scale)[:, None] ** np.arange(degree + 1)
         # the part of the residuals that the next power of time would describe

@@ -46,19 +46,18 @@ def fit_local(
     samples: Float[np.ndarray, " k"],
     noise: float,
     origin: float,
-    most: int = 3,
+    degree: int | None = None,
 ) -> LocalFit:
-    """Fit a polynomial by least squares, with a degree from one to three that depends
-    on the number of samples.
+    """Fit a polynomial by least squares.
 
     **Arguments:**
 
     - `noise`: standard deviation of a sample, which determines the covariance.
     - `origin`: time at which the fit will be evaluated.
-    - `most`: the highest degree.
+    - `degree`: the degree; by default `usual_degree`.
     """
-    degree = 3 if len(time) >= 24 else 2 if len(time) >= 8 else 1
-    degree = min(degree, len(time) - 1, most)
+    degree = usual_degree(len(time)) if degree is None else degree
+    degree = min(degree, len(time) - 1)
     # times are scaled to about 1, because otherwise the normal matrix is nearly
     # singular
     scale = max(float(np.max(np.abs(time - origin))), np.finfo(float).tiny)
@@ -68,6 +67,11 @@ def fit_local(
     unscale = scale ** -powers.astype(float)
     covariance = noise**2 * (inverse @ inverse.T) * np.outer(unscale, unscale)
     return LocalFit(origin, (inverse @ samples) * unscale, covariance)
+
+
+def usual_degree(count: int) -> int:
+    """Return the degree of a polynomial through a number of samples, one to three."""
+    return 3 if count >= 24 else 2 if count >= 8 else 1
 
 
 def crossing(

@@ -27,10 +27,13 @@ TIME = "time_s"
 
 @dataclasses.dataclass(frozen=True)
 class Chosen:
-    """Channels by name, including the time, and remarks on omitted data."""
+    """Channels by name, including the time, remarks on omitted data, and the names of
+    the columns that were not read.
+    """
 
     columns: dict[str, Float[np.ndarray, " k"]]
     notes: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 def read_columns(
@@ -71,7 +74,9 @@ def read_columns(
         found[renamed] = numbers * (factor * unit)
     found = _timed(source, found, rate)
     _require(source, found, (*needed, *([split] if split else [])))
-    return _without_missing(source, found)
+    picked = {name for name, _, _ in picks}
+    unread = tuple(name for name in source.columns if name not in picked)
+    return dataclasses.replace(_without_missing(source, found), unread=unread)
 
 
 def column_names(file: Path, columns: Columns | None) -> tuple[str, ...]:

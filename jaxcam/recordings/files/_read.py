@@ -103,7 +103,7 @@ def read_recordings(
         for recording in pieces:
             check_channels(recording)
             check_drive(recording)
-        recordings += [_noted(piece, chosen.notes) for piece in pieces]
+        recordings += [_noted(piece, chosen.notes, chosen.unread) for piece in pieces]
     return tuple(recordings)
 
 
@@ -248,12 +248,18 @@ def _turning(label: str, mended: Mended) -> list[Recording]:
     ]
 
 
-def _noted(piece: Recording, notes: tuple[str, ...]) -> Recording:
-    """Return a piece whose notes begin with the remarks on omitted data of its file."""
-    if not notes:
-        return piece
-    said = (*notes, *piece.meta.get("notes", ()))
-    return dataclasses.replace(piece, meta={**piece.meta, "notes": said})
+def _noted(
+    piece: Recording, notes: tuple[str, ...], unread: tuple[str, ...]
+) -> Recording:
+    """Return a piece whose notes begin with the remarks on omitted data of its file,
+    with the names of the columns that were not read.
+    """
+    meta = dict(piece.meta)
+    if notes:
+        meta["notes"] = (*notes, *meta.get("notes", ()))
+    if unread:
+        meta["unread"] = unread
+    return dataclasses.replace(piece, meta=meta)
 
 
 def has_recordings(folder: Path) -> bool:
