@@ -14,10 +14,9 @@ _EASED, _POOR = 0.1, 0.5
 _GOOD = 0.5
 # Damping below which it is reduced in a valley
 _LOW = 1e-1
-# Initial damping of the states, and damping after a step rejected without any; factor
-# after each further one, and factor after an accepted step; smaller values are set to
-# zero
-_STATES, _FIRST_OF_STATES, _RAISED, _LOWERED, _NONE = 1e-4, 1e-6, 100.0, 0.01, 1e-9
+# Damping of the states after the first rejected step, factor after each further one,
+# and factor after an accepted step; smaller values are set to zero
+_FIRST_OF_STATES, _RAISED, _LOWERED, _NONE = 1e-6, 100.0, 0.01, 1e-9
 
 
 class Damping(NamedTuple):
@@ -29,7 +28,7 @@ class Damping(NamedTuple):
     """Factor on the damping if the next step is good."""
     raised: int = 0
     """Number of steps rejected since the last accepted one."""
-    states: float = _STATES
+    states: float = 0.0
     """The damping of the states, as a fraction of their own information: with the
     parameters held, a full step of the states may still be too long."""
 
