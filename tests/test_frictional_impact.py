@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import jaxcam
 from jaxcam.hybrid import SwitchedSystem
-from jaxcam.hybrid.surface import impacts
+from jaxcam.hybrid.surface import impacts, restitutions
 from jaxcam.hybrid.surface._frictional_impact import impulses, Rates
 from jaxcam.models import SpinningBall
 
@@ -225,6 +225,27 @@ def test_a_falling_rod(kind):
     forces = found.total * normal - 0.4 * (found.positive - found.negative) * tangent
     expected = STATE[3:] + inverse @ forces / scale
     np.testing.assert_allclose(after[3:], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_friction_may_throw_a_rod_off_faster_than_it_came(kind):
+    """The coefficient that is checked is that of the law, 0.6 to rounding, although
+    friction that jams the rod raises the ratio of the normal velocities above one.
+    """
+    rod, state = Rod(friction=2.0, kind=kind), _jamming()
+    normal, _ = rod._rows(state)
+    after = impacts(rod, jnp.asarray(0.0), state)[0]
+    ratio = -float(normal @ after[3:]) / float(normal @ state[3:])
+    assert (ratio > 1) == (kind != "kinematic")
+    found = restitutions(rod, jnp.asarray(0.0), state)
+    np.testing.assert_allclose(found, [0.6], rtol=1e-12)
+    assert jaxcam.simulate(rod, state, 0.0, 0.01).successful
+
+
+def _jamming():
+    """A rod inclined by 30 degrees that slides fast ahead of its lower end."""
+    angle = np.pi / 6
+    return jnp.array([0.0, np.cos(angle), angle, -3.0, -0.3, 0.0])
 
 
 def test_the_derivatives_of_a_falling_rod():
