@@ -31,6 +31,8 @@ class Sides(NamedTuple):
     sliding: tuple
     # for each surface, whether sliding along it ends here
     leaves: list
+    # for each surface, whether the state is on it, to within rounding
+    near: list
 
 
 class Passed(NamedTuple):
@@ -110,6 +112,7 @@ def sides_after(
     shares = functions.shares(t, made.raw, carried.mode)
     heights, blur = functions.heights(t, x, carried.extents, carried.mode)
     leaves = [jnp.asarray(False) for _ in negative]
+    on = list(leaves)
     for k, crossed in enumerate(across):
         if k not in functions.slidable:
             negative[k] = negative[k] ^ crossed
@@ -118,10 +121,11 @@ def sides_after(
         leaves[k] = crossed & slid
         turns = jnp.where(slid, shares[k] > 0.5, True)
         near = _NEAR * _size(carried, k) + 500 * blur[k]
-        thrown = lands & ~crossed & slid & (jnp.abs(heights[k]) > near)
+        on[k] = jnp.abs(heights[k]) <= near
+        thrown = lands & ~crossed & slid & ~on[k]
         negative[k] = jnp.where(thrown, heights[k] < 0, negative[k] ^ (crossed & turns))
         sliding[k] = slid & ~leaves[k] & ~thrown
-    return Sides(tuple(negative), tuple(sliding), leaves)
+    return Sides(tuple(negative), tuple(sliding), leaves, on)
 
 
 def past_surfaces(
