@@ -84,9 +84,10 @@ def test_a_shaken_box_is_a_block(amplitude):
     block = jaxcam.simulate(Block(amplitude=amplitude), [0.0, 0.5], 0.0, 6.0)
     assert run.successful, run.result
     np.testing.assert_allclose(run.at(times)[:, 0], block.at(times)[:, 0], atol=1e-9)
-    # the start and the end of sticking, to 1e-9 s
-    first = np.unique(np.asarray(run.switches.time).round(9))
-    np.testing.assert_allclose(first, block.switches.time, atol=2e-9)
+    # the start and the end of sticking of either foot, to 1e-9 s
+    found, known = (np.asarray(one.switches.time) for one in (run, block))
+    apart = np.abs(found[:, None] - known[None])
+    assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-9
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.3])
@@ -124,11 +125,10 @@ def test_a_box_that_falls_comes_to_rest(start):
         run = jaxcam.simulate(Box(order=order), start, 0.0, 2.0)
         assert run.successful, run.result
         np.testing.assert_allclose(run.final[1:], [0.2, 0, 0, 0, 0], atol=1e-9)
-        sizes = jnp.array([1.0, 1.0, 0.1])
         before, after = (
-            jnp.sum(sizes * state[:, 3:] ** 2, axis=1)
+            np.square(np.asarray(state)[:, 3:]) @ [1.0, 1.0, 0.1]
             for state in (run.impacts.before, run.impacts.after)
         )
-        assert np.all(np.asarray(after - before) <= 1e-12)
+        assert np.all(after - before <= 1e-12)
         ends.append(float(run.final[0]))
     assert ends[0] == pytest.approx(ends[1], abs=1e-6)

@@ -110,6 +110,7 @@ def sides_after(
         flags = [a ^ b for a, b in zip(negative, across, strict=True)]
         return Sides(tuple(flags), tuple(sliding), [])
     shares = functions.shares(t, made.raw, carried.mode)
+    across = _leaving_together(functions, carried, shares, across)
     heights, blur = functions.heights(t, x, carried.extents, carried.mode)
     leaves = [jnp.asarray(False) for _ in negative]
     on = list(leaves)
@@ -126,6 +127,21 @@ def sides_after(
         negative[k] = jnp.where(thrown, heights[k] < 0, negative[k] ^ (crossed & turns))
         sliding[k] = slid & ~leaves[k] & ~thrown
     return Sides(tuple(negative), tuple(sliding), leaves, on)
+
+
+def _leaving_together(functions: Functions, carried: LoopState, shares, across):
+    """Return the surfaces that are crossed, and those where sliding ends at the same
+    time: friction holds the feet of a rigid body that lies flat up to the same limit.
+    """
+    if not functions.rubs or len(functions.slidable) < 2:
+        return across
+    slack = functions.slack(carried.mode)
+    ends = any_of([across[k] & carried.sliding[k] for k in functions.slidable])
+    found = list(across)
+    for k in functions.slidable:
+        left = (shares[k] + slack[k]) * (1 + slack[k] - shares[k])
+        found[k] = found[k] | (ends & carried.sliding[k] & (left <= _NEAR))
+    return found
 
 
 def past_surfaces(
