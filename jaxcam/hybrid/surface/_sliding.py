@@ -292,9 +292,8 @@ def beyond_shares(mode: InMode, t, x) -> Float[Array, " k"]:
     motion does not slide.
     """
     found = list(shares(mode, slide_terms(mode, t, x)))
-    zero = jnp.zeros_like(t)
     places = {k: share for k, share in zip(mode.slidable, found, strict=True)}
-    return jnp.stack([places.get(k, zero) for k in range(len(mode.jumps))])
+    return jnp.stack([places.get(k, 0 * t) for k in range(len(mode.jumps))])
 
 
 def hold_of(mode: InMode, t, x) -> Float[Array, "2 k"]:
