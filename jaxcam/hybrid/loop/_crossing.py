@@ -165,19 +165,13 @@ def past_surfaces(
     """
     jets, m = list(jets), functions.m
     slides, stuck = [], jnp.asarray(False)
-    passed_over = stuck
+    passed_over, over = stuck, carried.passed_over
     slack = functions.slack(carried.mode) if functions.slidable else ()
     for k in range(functions.k):
         jet, behind = jets[m + k], carried.behind[k]
-        near = _near(carried, k)
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
-        # if friction stops the slip during a chatter, its completion moves the slip
-        # velocity beyond zero
-        summed = jnp.asarray(False)
-        if functions.m and k in functions.slidable:
-            summed = behind & (carried.stale[0] == COMPLETED)
-            near = jnp.where(summed, jnp.inf, near)
-        on = hit[m + k] & ~left & (jnp.abs(jet.gap) <= near)
+        crossed = hit[m + k] & ~left
+        on = crossed & (jnp.abs(jet.gap) <= _near(carried, k))
         back = on & moves_in(jet._replace(gap=jnp.where(on, 0.0, jet.gap)), blur[m + k])
         gap = jnp.where(on | left, 0.0, jet.gap)
         if k not in functions.slidable:
@@ -188,9 +182,11 @@ def past_surfaces(
             jets[m + k] = jet._replace(gap=gap)
             continue
         most = -approach * slack[k] / (1 + slack[k])
-        slides.append(on & ((jet.velocity <= most) | stops[k]))
+        summed = crossed & over[k]
+        slides.append((on | summed) & ((jet.velocity <= most) | stops[k]))
         if functions.m:
             passed_over = passed_over | (slides[k] & summed)
+            gap = jnp.where(slides[k], 0.0, gap)
         # at the limit of the friction force, the motion leaves with zero velocity
         smooth = left & ~behind & (slack[k] == 0)
         velocity = jnp.where(left, jnp.maximum(jet.velocity, 0.0), jet.velocity)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from ._crossing import Sides
 from ._functions import Functions
-from ._loop_state import COMPLETED, LoopState
+from ._loop_state import LoopState
 from ._select import any_of
 
 
@@ -34,10 +34,9 @@ def stick_together(
     if not functions.rubs or len(functions.slidable) < 2:
         return Together(none, none[0] if none else jnp.asarray(False))
     trial, fresh, summed = list(sides.sliding), list(none), list(none)
+    passed_over = carried.passed_over
     for k in functions.slidable:
-        # if friction stops the slip during a chatter, its completion moves the slip
-        # velocity beyond zero
-        summed[k] = carried.behind[k] & (carried.stale[0] == COMPLETED)
+        summed[k] = passed_over[k]
         fresh[k] = (sides.near[k] | summed[k]) & ~sides.leaves[k] & ~sides.sliding[k]
         trial[k] = trial[k] | fresh[k]
     begins = any_of(
