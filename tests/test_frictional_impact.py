@@ -276,3 +276,55 @@ def test_a_ball_that_grips_in_an_impact_comes_to_rest_rolling(restitution):
     expected = 0.5 * fall + 0.5 * 5 / 7 * (3 - fall)
     np.testing.assert_allclose(run.final[2], 0.5 * 5 / 7, atol=1e-13)
     np.testing.assert_allclose(run.final[0], expected, atol=1e-11)
+
+
+class Coupled(SwitchedSystem):
+    """Height and position of a contact point, and their velocities; a normal force also
+    accelerates the point sideways, as at the end of an inclined rod.
+    """
+
+    friction: float = 0.2
+    coupling: float = 0.5
+    restitution: float = 0.0
+
+    def switching(self, t, state):
+        return state[3]
+
+    def branch(self, t, state, sides):
+        return jnp.stack([state[2], state[3], -10.0, -5.0])
+
+    def gap(self, t, state):
+        return state[:1]
+
+    def impact(self, t, state):
+        push = -(1 + self.restitution) * state[2]
+        return state.at[2].add(push).at[3].add(self.coupling * push)[None]
+
+    def contact_friction(self, t, state, sides):
+        push = -self.friction * sides[0]
+        return jnp.stack([0.0, 0.0, self.coupling * push, push])[None]
+
+
+@pytest.mark.parametrize("restitution", [0.0, 1e-9])
+def test_a_slip_that_the_last_impact_reverses_goes_on_in_contact(restitution):
+    """The coupling reverses the slip, although friction could hold the point at rest in
+    contact. The slip then decreases until the point sticks.
+
+    Of a velocity of 1 m/s, a restitution of 1e-9 changes times by 1e-9 s; it only makes
+    sure that contact does not begin exactly at the impact.
+    """
+    system = Coupled(restitution=jnp.asarray(restitution))
+    run = jaxcam.simulate(system, [0.0095, 0.0, -0.9, -0.05], 0.0, 0.4)
+    assert run.successful, run.result
+    assert run.impacts.count == 1 and run.contacts.start.shape == (1,)
+    # impulses until the slip of -0.1 has stopped, and afterwards; the deceleration
+    first = 0.1 / (0.5 + 0.2)
+    slip = (0.5 - 0.2) * (1 - (1 + 0.2 * 0.5) * first) / (1 - 0.2 * 0.5)
+    slows = 5 - 10 * (0.5 - 0.2) / (1 - 0.2 * 0.5)
+    stop = 0.01 + slip / slows
+    switches = run.switches
+    np.testing.assert_allclose(switches.time, [0.01, stop], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(switches.after[0][3], slip, rtol=1e-8)
+    at_rest = np.asarray(run.at(jnp.array([0.39])))[0]
+    end = -0.00075 + slip**2 / (2 * slows)
+    np.testing.assert_allclose(at_rest, [0.0, end, 0.0, 0.0], rtol=0, atol=1e-9)

@@ -226,9 +226,7 @@ def first_state(
         stale=(jnp.where(slides, 2.0, jnp.where(held, 1.0, 0.0)),)
         if functions.slidable or functions.counts is not None
         else (),
-        thrown=(jnp.asarray(False),) * functions.k
-        if m and functions.slidable
-        else (),
+        thrown=(jnp.asarray(False),) * functions.k if m and functions.slidable else (),
         origin=origin,
         extents=extents,
         ramp=first,
