@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import jaxcam
 from jaxcam.hybrid import SwitchedSystem
-from jaxcam.hybrid.surface import impacts
+from jaxcam.hybrid.surface import impacts, restitutions
 from jaxcam.hybrid.surface._frictional_impact import impulses, Rates
 from jaxcam.models import SpinningBall
 
@@ -227,6 +227,27 @@ def test_a_falling_rod(kind):
     np.testing.assert_allclose(after[3:], expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_friction_may_throw_a_rod_off_faster_than_it_came(kind):
+    """The coefficient that is checked is that of the law, 0.6 to rounding, although
+    friction that jams the rod raises the ratio of the normal velocities above one.
+    """
+    rod, state = Rod(friction=2.0, kind=kind), _jamming()
+    normal, _ = rod._rows(state)
+    after = impacts(rod, jnp.asarray(0.0), state)[0]
+    ratio = -float(normal @ after[3:]) / float(normal @ state[3:])
+    assert (ratio > 1) == (kind != "kinematic")
+    found = restitutions(rod, jnp.asarray(0.0), state)
+    np.testing.assert_allclose(found, [0.6], rtol=1e-12)
+    assert jaxcam.simulate(rod, state, 0.0, 0.01).successful
+
+
+def _jamming():
+    """A rod inclined by 30 degrees that slides fast ahead of its lower end."""
+    angle = np.pi / 6
+    return jnp.array([0.0, np.cos(angle), angle, -3.0, -0.3, 0.0])
+
+
 def test_the_derivatives_of_a_falling_rod():
     """Against central differences, to 1e-8, at an impact in which the slip reverses."""
 
@@ -255,3 +276,55 @@ def test_a_ball_that_grips_in_an_impact_comes_to_rest_rolling(restitution):
     expected = 0.5 * fall + 0.5 * 5 / 7 * (3 - fall)
     np.testing.assert_allclose(run.final[2], 0.5 * 5 / 7, atol=1e-13)
     np.testing.assert_allclose(run.final[0], expected, atol=1e-11)
+
+
+class Coupled(SwitchedSystem):
+    """Height and position of a contact point, and their velocities; a normal force also
+    accelerates the point sideways, as at the end of an inclined rod.
+    """
+
+    friction: float = 0.2
+    coupling: float = 0.5
+    restitution: float = 0.0
+
+    def switching(self, t, state):
+        return state[3]
+
+    def branch(self, t, state, sides):
+        return jnp.stack([state[2], state[3], -10.0, -5.0])
+
+    def gap(self, t, state):
+        return state[:1]
+
+    def impact(self, t, state):
+        push = -(1 + self.restitution) * state[2]
+        return state.at[2].add(push).at[3].add(self.coupling * push)[None]
+
+    def contact_friction(self, t, state, sides):
+        push = -self.friction * sides[0]
+        return jnp.stack([0.0, 0.0, self.coupling * push, push])[None]
+
+
+@pytest.mark.parametrize("restitution", [0.0, 1e-9])
+def test_a_slip_that_the_last_impact_reverses_goes_on_in_contact(restitution):
+    """The coupling reverses the slip, although friction could hold the point at rest in
+    contact. The slip then decreases until the point sticks.
+
+    Of a velocity of 1 m/s, a restitution of 1e-9 changes times by 1e-9 s; it only makes
+    sure that contact does not begin exactly at the impact.
+    """
+    system = Coupled(restitution=jnp.asarray(restitution))
+    run = jaxcam.simulate(system, [0.0095, 0.0, -0.9, -0.05], 0.0, 0.4)
+    assert run.successful, run.result
+    assert run.impacts.count == 1 and run.contacts.start.shape == (1,)
+    # impulses until the slip of -0.1 has stopped, and afterwards; the deceleration
+    first = 0.1 / (0.5 + 0.2)
+    slip = (0.5 - 0.2) * (1 - (1 + 0.2 * 0.5) * first) / (1 - 0.2 * 0.5)
+    slows = 5 - 10 * (0.5 - 0.2) / (1 - 0.2 * 0.5)
+    stop = 0.01 + slip / slows
+    switches = run.switches
+    np.testing.assert_allclose(switches.time, [0.01, stop], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(switches.after[0][3], slip, rtol=1e-8)
+    at_rest = np.asarray(run.at(jnp.array([0.39])))[0]
+    end = -0.00075 + slip**2 / (2 * slows)
+    np.testing.assert_allclose(at_rest, [0.0, end, 0.0, 0.0], rtol=0, atol=1e-9)

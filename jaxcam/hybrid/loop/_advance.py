@@ -213,6 +213,7 @@ def after_attempt(
             for old, new in zip(carried.points, attempt.points, strict=True)
         ),
         stale=select(good, attempt.stale, carried.stale),
+        thrown=_thrown(carried, good),
         origin=carried.origin,
         extents=moved_extents(carried.extents, carried.origin, attempt),
         ramp=stop_gradient(jnp.where(good, 6.0 * carried.ramp, carried.ramp)),
@@ -259,6 +260,14 @@ def _weight(attempt):
     if len(attempt.held) < 2:
         return 1.0
     return jnp.where(attempt.good & attempt.loses, _IMPACT_WEIGHT, 1.0)
+
+
+def _thrown(carried, good):
+    """Return the flags `thrown` of the loop state after an attempt."""
+    if not carried.thrown:
+        return carried.thrown
+    now = tuple(carried.completing & behind for behind in carried.behind)
+    return select(good, now, carried.thrown)
 
 
 def _crossed(carried, attempt):

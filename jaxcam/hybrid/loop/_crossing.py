@@ -31,6 +31,8 @@ class Sides(NamedTuple):
     sliding: tuple
     # for each surface, whether sliding along it ends here
     leaves: list
+    # for each surface, whether the state is on it, to within rounding
+    near: list
 
 
 class Passed(NamedTuple):
@@ -108,8 +110,10 @@ def sides_after(
         flags = [a ^ b for a, b in zip(negative, across, strict=True)]
         return Sides(tuple(flags), tuple(sliding), [])
     shares = functions.shares(t, made.raw, carried.mode)
+    across = _leaving_together(functions, carried, shares, across)
     heights, blur = functions.heights(t, x, carried.extents, carried.mode)
     leaves = [jnp.asarray(False) for _ in negative]
+    on = list(leaves)
     for k, crossed in enumerate(across):
         if k not in functions.slidable:
             negative[k] = negative[k] ^ crossed
@@ -118,10 +122,26 @@ def sides_after(
         leaves[k] = crossed & slid
         turns = jnp.where(slid, shares[k] > 0.5, True)
         near = _NEAR * _size(carried, k) + 500 * blur[k]
-        thrown = lands & ~crossed & slid & (jnp.abs(heights[k]) > near)
+        on[k] = jnp.abs(heights[k]) <= near
+        thrown = lands & ~crossed & slid & ~on[k]
         negative[k] = jnp.where(thrown, heights[k] < 0, negative[k] ^ (crossed & turns))
         sliding[k] = slid & ~leaves[k] & ~thrown
-    return Sides(tuple(negative), tuple(sliding), leaves)
+    return Sides(tuple(negative), tuple(sliding), leaves, on)
+
+
+def _leaving_together(functions: Functions, carried: LoopState, shares, across):
+    """Return the surfaces that are crossed, and those where sliding ends at the same
+    time: friction holds the feet of a rigid body that lies flat up to the same limit.
+    """
+    if not functions.rubs or len(functions.slidable) < 2:
+        return across
+    slack = functions.slack(carried.mode)
+    ends = any_of([across[k] & carried.sliding[k] for k in functions.slidable])
+    found = list(across)
+    for k in functions.slidable:
+        left = (shares[k] + slack[k]) * (1 + slack[k] - shares[k])
+        found[k] = found[k] | (ends & carried.sliding[k] & (left <= _NEAR))
+    return found
 
 
 def past_surfaces(
@@ -145,19 +165,13 @@ def past_surfaces(
     """
     jets, m = list(jets), functions.m
     slides, stuck = [], jnp.asarray(False)
-    passed_over = stuck
+    passed_over, over = stuck, carried.passed_over
     slack = functions.slack(carried.mode) if functions.slidable else ()
     for k in range(functions.k):
         jet, behind = jets[m + k], carried.behind[k]
-        near = _near(carried, k)
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
-        # if friction stops the slip during a chatter, its completion moves the slip
-        # velocity beyond zero
-        summed = jnp.asarray(False)
-        if functions.m and k in functions.slidable:
-            summed = behind & (carried.stale[0] == COMPLETED)
-            near = jnp.where(summed, jnp.inf, near)
-        on = hit[m + k] & ~left & (jnp.abs(jet.gap) <= near)
+        crossed = hit[m + k] & ~left
+        on = crossed & (jnp.abs(jet.gap) <= _near(carried, k))
         back = on & moves_in(jet._replace(gap=jnp.where(on, 0.0, jet.gap)), blur[m + k])
         gap = jnp.where(on | left, 0.0, jet.gap)
         if k not in functions.slidable:
@@ -168,9 +182,11 @@ def past_surfaces(
             jets[m + k] = jet._replace(gap=gap)
             continue
         most = -approach * slack[k] / (1 + slack[k])
-        slides.append(on & ((jet.velocity <= most) | stops[k]))
+        summed = crossed & over[k]
+        slides.append((on | summed) & ((jet.velocity <= most) | stops[k]))
         if functions.m:
             passed_over = passed_over | (slides[k] & summed)
+            gap = jnp.where(slides[k], 0.0, gap)
         # at the limit of the friction force, the motion leaves with zero velocity
         smooth = left & ~behind & (slack[k] == 0)
         velocity = jnp.where(left, jnp.maximum(jet.velocity, 0.0), jet.velocity)

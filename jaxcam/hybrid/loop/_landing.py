@@ -15,6 +15,7 @@ from ._rest_together import loses_energy, rest_together
 from ._select import any_of, largest, of_constraint, select
 from ._series import taylor
 from ._step import seen_from_inside, Step, StepEnd
+from ._stick_together import stick_together
 
 
 # changes of the normal velocities by a joint impact that are below this fraction of the
@@ -205,13 +206,15 @@ def _after_surfaces(
     passed = past_surfaces(
         functions, carried, jets, hit, sides, approach, rounding, stops
     )
-    flags = zip(mode[number:], passed.slides, strict=True)
+    joined = stick_together(functions, carried, hit, sides, mode, t, x)
+    slides = [a | b for a, b in zip(passed.slides, joined.slides, strict=True)]
+    flags = zip(mode[number:], slides, strict=True)
     mode = mode[:number] + tuple(a | b for a, b in flags)
     if functions.m and functions.slidable:
         moved, _ = functions.settled(t, x, mode)
-        x = select(passed.passed_over, moved, x)
+        x = select(passed.passed_over | joined.passed_over, moved, x)
     blur = functions.blur(t, x, carried.extents, mode)
-    flags = any_of(passed.slides), any_of(sides.leaves), passed.stuck
+    flags = any_of(slides), any_of(sides.leaves), passed.stuck
     return After(x, mode, passed.jets, blur, *flags)
 
 

@@ -58,6 +58,10 @@ class LoopState(NamedTuple):
     # since the jets were computed, so that the jets of surfaces (1), or also those of
     # constraints (2), are old; `COMPLETED` (only surfaces) after a completed chatter
     stale: tuple
+    # for surfaces along which a motion can slide, if there are constraints: after a
+    # completed chatter, whether the last impact before it has already moved the state
+    # across each of them
+    thrown: tuple
     # start value and largest excursion of each component: see `_scale.py`
     origin: tuple
     extents: tuple
@@ -108,6 +112,20 @@ class LoopState(NamedTuple):
         parts = (self.jets, self.sizes, self.blur)
         rest = (part[len(self.held) :] for part in parts)
         return [j.gap < -(2e-12 * s + b) for j, s, b in zip(*rest, strict=True)]
+
+    @property
+    def passed_over(self) -> list:
+        """For each switching surface, whether the completion of a chatter has moved the
+        state past it.
+
+        If friction stops the slip during a chatter, its completion moves the slip
+        velocity beyond zero. But an impact may also reverse a slip.
+        """
+        if not self.thrown:
+            return [jnp.asarray(False) for _ in self.negative]
+        completed = self.stale[0] == COMPLETED
+        pairs = zip(self.behind, self.thrown, strict=True)
+        return [completed & behind & ~thrown for behind, thrown in pairs]
 
 
 def loop_state(lane: Any) -> LoopState:
@@ -208,6 +226,7 @@ def first_state(
         stale=(jnp.where(slides, 2.0, jnp.where(held, 1.0, 0.0)),)
         if functions.slidable or functions.counts is not None
         else (),
+        thrown=(jnp.asarray(False),) * functions.k if m and functions.slidable else (),
         origin=origin,
         extents=extents,
         ramp=first,

@@ -65,9 +65,10 @@ def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bo
     """
     number = len(closed)
     slips, before = velocities[:number], velocities[number:]
-    sizes = jnp.repeat(
-        jnp.stack([_largest(slips, closed), _largest(before, closed)]), number
-    )
+    # slips far below the changes that the impact causes are rounding errors
+    changes = jnp.abs(matrix[:number, number:]) @ jnp.abs(before)
+    slipping = _largest(jnp.maximum(jnp.abs(slips), changes), closed)
+    sizes = jnp.repeat(jnp.stack([slipping, _largest(before, closed)]), number)
     pressed = contact_impulses(matrix, velocities, closed, sizes)
     between = velocities + matrix @ pressed
     if newton:

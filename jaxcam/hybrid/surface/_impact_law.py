@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._system import HybridSystem
-from ._impacts import impacts
 from ._normal import gaps, normal_velocity
 from ._rounding import speed_rounding
 
@@ -28,7 +27,9 @@ def restitutions(
     the coefficient is minus the ratio of the normal velocities after and before an
     impact (thesis, eq. 2.27). For a state at rest on the constraint, the normal
     velocity is only rounding error, so it is replaced by a larger value, or by 1 if it
-    is exactly zero and has no rounding error.
+    is exactly zero and has no rounding error. The law is `system.impact`, without
+    contact friction: with Poisson's or Stronge's coefficient, friction may increase the
+    ratio of the normal velocities above one.
 
     Args:
         system: The system.
@@ -53,7 +54,8 @@ def restitutions(
         size = jnp.maximum(jnp.abs(value), _KNOWN * rounding)
         wanted = -jnp.where(size == 0, 1.0, size) if approach is None else -approach
         y = y + (wanted - value) * slope / jnp.sum(slope * slope)
-        found.append(-speed(impacts(system, t, y)[k]) / speed(y))
+        after = jnp.atleast_2d(system.impact(t, y))[k]
+        found.append(-speed(after) / speed(y))
     return jnp.stack(found) if found else jnp.zeros((0,))
 
 

@@ -27,7 +27,7 @@ from jaxtyping import Array, Bool, Float
 
 from .._types import RealScalar, State
 from ._contact_forces import contact_forces, contact_terms, Distances
-from ._masked import solve_masked
+from ._equal_slips import solve_equal_slips
 from ._normal import along_path, gaps, motion_rates
 from ._rounding import gap_rounding, rounding_of
 from ._switches import OnSides, surfaces
@@ -173,7 +173,7 @@ def _returns(mode: InMode, gains: Float[Array, "K K"], least) -> Float[Array, " 
         return own
     others, found = _slides_on(mode) & (own > least), []
     for k in range(number):
-        kept = solve_masked(gains, gains[:, k], others)
+        kept = solve_equal_slips(gains, gains[:, k], others, 0.0)
         rest = own[k] - jnp.sum(jnp.where(others, gains[k] * kept, 0.0))
         found.append(jnp.where(own[k] > least[k], own[k], rest))
     return jnp.stack(found)
@@ -189,7 +189,8 @@ def shares(mode: InMode, terms: SlideTerms) -> Float[Array, " K"]:
     """Return the weight b of the branch beyond each surface, zero if the motion does
     not slide.
     """
-    return solve_masked(terms.gains, -terms.slopes, _slides_on(mode) & terms.firm)
+    on = _slides_on(mode) & terms.firm
+    return solve_equal_slips(terms.gains, -terms.slopes, on, 1.0)
 
 
 def field_in_mode(mode: InMode, t, x) -> State:
@@ -291,9 +292,8 @@ def beyond_shares(mode: InMode, t, x) -> Float[Array, " k"]:
     motion does not slide.
     """
     found = list(shares(mode, slide_terms(mode, t, x)))
-    zero = jnp.zeros_like(t)
     places = {k: share for k, share in zip(mode.slidable, found, strict=True)}
-    return jnp.stack([places.get(k, zero) for k in range(len(mode.jumps))])
+    return jnp.stack([places.get(k, 0 * t) for k in range(len(mode.jumps))])
 
 
 def hold_of(mode: InMode, t, x) -> Float[Array, "2 k"]:
@@ -323,7 +323,7 @@ def settled(mode: InMode, t, x) -> Float[Array, "rows n"]:
     """
     terms = slide_terms(mode, t, x)
     on = _slides_on(mode)
-    lengths = solve_masked(terms.gains, terms.heights, on & terms.firm)
+    lengths = solve_equal_slips(terms.gains, terms.heights, on & terms.firm, 0.0)
     kicks = jnp.where(on[:, None], terms.kicks, 0.0)
     moves = jnp.where((on & terms.firm)[:, None], terms.kicks, 0.0)
     after = x - jnp.sum(lengths[:, None] * moves, axis=0)

@@ -1,0 +1,48 @@
+"""Solve for the weights of sliding if several surfaces have the same slip velocity.
+
+The feet of a rigid body that rests flat on a floor slip at the same velocity. Their
+friction forces are then statically indeterminate: only the sum is determined. It is
+shared in proportion to the limits of these forces, so the feet begin to slip together.
+"""
+
+import jax.numpy as jnp
+
+from ._masked import solve_masked
+
+
+# two surfaces have the same slip velocity if the determinant of their gains is below
+# this fraction of the product of the diagonal
+_EQUAL = 1e-9
+
+
+def solve_equal_slips(gains, right, mask, shift):
+    """Return the solution for the masked unknowns, zero elsewhere.
+
+    Of two surfaces with the same slip velocity, the second has the weight of the first,
+    measured from half the distance between the sides, `shift`: b_2 - shift / 2 =
+    s (b_1 - shift / 2), where s = -1 if the motion came from opposite sides.
+
+    **Arguments:** the changes of the slopes (rows) by the weights (columns), the wanted
+    changes, the surfaces on which the motion slides, and 1, or 0 if the unknowns are
+    changes of weights.
+    """
+    number = right.shape[0]
+    if number == 1:
+        return solve_masked(gains, right, mask)
+    rows = [[gains[i, k] for k in range(number)] for i in range(number)]
+    values = [right[i] for i in range(number)]
+    for p in range(1, number):
+        follows = jnp.asarray(False)
+        for q in range(p):
+            product = gains[q, q] * gains[p, p]
+            rest = product - gains[q, p] * gains[p, q]
+            equal = mask[p] & mask[q] & (jnp.abs(rest) <= _EQUAL * jnp.abs(product))
+            now, follows = equal & ~follows, follows | equal
+            sign = jnp.where(gains[q, p] * gains[q, q] < 0, -1.0, 1.0)
+            tied = [jnp.asarray(float(k == p)) for k in range(number)]
+            tied[q] = -sign
+            pairs = zip(tied, rows[p], strict=True)
+            rows[p] = [jnp.where(now, a, b) for a, b in pairs]
+            values[p] = jnp.where(now, shift * (1 - sign) / 2, values[p])
+    matrix = jnp.stack([jnp.stack(row) for row in rows])
+    return solve_masked(matrix, jnp.stack(values), mask)
