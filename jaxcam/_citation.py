@@ -21,6 +21,7 @@ _TOPICS: dict[str, tuple[str, ...]] = {
     "discrepancy": ("desilva2020",),
     "equinox": ("kidger2021equinox",),
     "filippov": ("filippov1988", "leine2004"),
+    "gear rattle": ("karagiannis1991",),
     "grazing": ("nordmark1991", "dibernardo2001"),
     "impacting systems": ("dibernardo2008",),
     "lyapunov": ("benettin1980",),

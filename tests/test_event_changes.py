@@ -9,7 +9,11 @@ import continuation
 import jaxcam
 from benchmarks.first_orbit import BELT, BeltWithStop
 from continuation._parameter import pick_one
-from continuation.orbits._event_changes import events_of, name_of_change
+from continuation.orbits._event_changes import (
+    events_of,
+    name_of_change,
+    within_symmetry,
+)
 from jaxcam.filippov.modes import surface_rates
 from jaxcam.hybrid import flow, Settings, SwitchedSystem
 from jaxcam.models import BouncingBall
@@ -239,6 +243,23 @@ def test_names_of_changes(before, after, name):
     first, second = _sequence(*before), _sequence(*after)
     assert name_of_change(first, second) == name
     assert name_of_change(second, first) == name
+
+
+@pytest.mark.parametrize("times", [(0.5, 2.5), (0.5, 2.4)])
+def test_changes_of_symmetric_orbits_are_named_like_others(times):
+    """Two crossings half a period apart that begin to slide, and two that do not: only
+    the former is the same change twice.
+    """
+    event = Event("cross", 0)
+    before = [(time, event) for time in times]
+    after = [
+        (time + late, Event(kind, 0))
+        for time in times
+        for late, kind in ((0.0, "slide"), (1e-6, "leave"))
+    ]
+    name = name_of_change(*within_symmetry(before, after, 4.0))
+    symmetric = times[1] - times[0] == 2.0
+    assert name == ("crossing-sliding" if symmetric else "change of events")
 
 
 def test_the_impacts_of_complete_chatter_are_one_event():

@@ -16,6 +16,9 @@ from ..problem import Monitor
 CHANGE = "change of events"
 """Kind of a change that has no name of its own."""
 
+# Just beyond a grazing, the times of its events vary as the square root of the errors.
+_SYMMETRIC = 1e-4
+
 _MODE = ("contacts", "sides", "sliding")
 _COUNTED = ("impacts", "contacts", "crossings", "slides")
 
@@ -64,6 +67,39 @@ def events_of(
     longest = int(np.argmax(np.diff(times, prepend=start)))
     begin = times[longest] - np.diff(times, prepend=start)[longest] / 2
     return [one for one in found if begin <= one[0] < begin + end - start]
+
+
+def within_symmetry(
+    before: list[tuple[float, Event]],
+    after: list[tuple[float, Event]],
+    period: float,
+) -> tuple[list[tuple[float, Event]], list[tuple[float, Event]]]:
+    """Return the events of half a period if, in both orbits, those of the other half
+    repeat them, and all events otherwise.
+
+    On a branch of symmetric orbits, every change occurs twice at the same point.
+    """
+    halves = [_half(events, period) for events in (before, after)]
+    if any(half is None for half in halves):
+        return before, after
+    return halves[0], halves[1]  # pyright: ignore
+
+
+def _half(events: list[tuple[float, Event]], period: float):
+    """Return the first half of the events if they repeat after half a period, or None.
+
+    The constraints and surfaces need not be the same: a symmetry may exchange them.
+    """
+    number, odd = divmod(len(events), 2)
+    if odd or not number:
+        return None
+    for (time, event), (later, other) in zip(
+        events[:number], events[number:], strict=True
+    ):
+        shift = later - time - period / 2
+        if event.kind != other.kind or abs(shift) > _SYMMETRIC * period:
+            return None
+    return events[:number]
 
 
 def name_of_change(

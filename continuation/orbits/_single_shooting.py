@@ -29,6 +29,7 @@ from ._event_changes import (
     monitors_of_events,
     name_of_change,
     values_of_events,
+    within_symmetry,
 )
 from ._gap_grazing import touching
 from ._run_twice import shooting_twice
@@ -274,12 +275,13 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         del name
 
         def events(u, parameters):
-            parameters = as_jax(parameters)
-            u = jnp.asarray(u)
-            times = self.times(u, parameters)
-            return events_of(parameters, self.state(u), *times, self.settings)
+            u, parameters = jnp.asarray(u), as_jax(parameters)
+            start, end = self.times(u, parameters)
+            found = events_of(parameters, self.state(u), start, end, self.settings)
+            return found, float(end - start)
 
-        return name_of_change(events(*before), events(*after))
+        (first, length), (second, _) = events(*before), events(*after)
+        return name_of_change(*within_symmetry(first, second, length))
 
     def evaluated_on_host(self, leaf: int, z) -> Evaluation | None:
         return evaluated_by_llvm(self, leaf, z)

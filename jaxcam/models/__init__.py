@@ -22,6 +22,7 @@ from ._piecewise_linear import (
     planar_stability as planar_stability,
 )
 from ._presets import preset as preset
+from ._rattling_gear import RattlingGear as RattlingGear
 from ._relay_feedback import RelayFeedback as RelayFeedback
 from ._relief_valve import ReliefValve as ReliefValve
 from ._restitution import (
