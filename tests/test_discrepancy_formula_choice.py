@@ -21,9 +21,7 @@ def _trial(score, cost=1000.0):
     samples = types.SimpleNamespace(samples=1000)
     one = types.SimpleNamespace(slot="force_a", smooth=True, coefficients="abc")
     found = _Fit(cost, samples)
-    return types.SimpleNamespace(
-        score=score, functions=(one,), fit=found, problem=None
-    )
+    return types.SimpleNamespace(score=score, functions=(one,), fit=found, problem=None)
 
 
 @pytest.fixture
