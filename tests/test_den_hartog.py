@@ -116,7 +116,7 @@ def test_a_branch_locates_and_names_the_onset_of_stops(omega, kind):
     friction = boundary(omega)
     system = DryFrictionOscillator(omega=omega, friction=0.95 * friction)
     orbit = continuation.periodic_orbit(system)
-    bounds = (0.9 * friction, 1.2 * friction)
+    bounds = (0.94 * friction, 1.14 * friction)
     found = continuation.branch(system, orbit, "friction", bounds)
     onset, *later = found.special
     assert onset.kind == kind and onset.converged
