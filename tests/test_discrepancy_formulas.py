@@ -280,3 +280,12 @@ def test_a_formula_has_no_double_signs_and_no_phase_just_below_a_turn():
     straight = next(one for one in family.primitives if one.name == "straight")
     text, _ = formula_of(family, straight, np.array([1.5]), "force")
     assert text == "1*(position + 0.4)"
+
+
+def test_a_wavelength_is_positive():
+    """A cosine with the negative wave number of its fit is the same oscillation."""
+    family = _family(Variable.POSITION)
+    wave = next(one for one in family.primitives if one.name == "wave")
+    written = formula_of(family, wave, np.array([0.5, 2.0, 0.4]), "force")
+    assert formula_of(family, wave, np.array([0.5, -2.0, -0.4]), "force") == written
+    assert "with a wavelength of 0.75" in written[1]

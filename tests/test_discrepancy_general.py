@@ -196,7 +196,9 @@ class Rubbed(Swing):
 
 
 def test_a_parameter_at_its_bound_takes_up_nothing():
-    """Dry friction of 0.2 rad/s^2, and a little push that no damping can be."""
+    """Dry friction of 0.2 rad/s^2, and a little push that no damping can be: the named
+    terms alone must give the friction.
+    """
 
     def force(t, x, v):
         return -0.2 * np.tanh(v / 1e-3) + 0.01 * v
@@ -208,6 +210,7 @@ def test_a_parameter_at_its_bound_takes_up_nothing():
             _STIFF,
             Parameter("damping", lambda m: m.system.damping, scale=0.01, lower=0.0),
         ],
+        policy=Policy(functions=0),
     )
     assert found.rig["damping"].value == 0.0
     friction = {e.name: e for e in found.effects}["coulomb_friction"].parameters["fc"]

@@ -20,6 +20,7 @@ from jaxcam.sweeps import (
     ImpactSection,
     largest_exponents,
     load_sweep,
+    Map,
     Stroboscopic,
 )
 from jaxcam.sweeps._basins_job import default_scale
@@ -163,6 +164,16 @@ def test_attractors_are_matched_along_a_parameter(tmp_path):
     )
     assert found.names[0, 1] == "P(6,6)" and found.shares[2, 1] == 0
     assert load_sweep(tmp_path / "0001").names == found.basins[1].names
+
+
+def test_an_attractor_that_vanished_is_not_matched_with_a_later_one():
+    """An orbit of period two is there, is not, and is there again."""
+    cubic = Map(lambda x, p: p["a"] * x - 0.5 * x**3, {"a": 2.2})
+    grid = Grid([-1.0], [1.0], [10])
+    found = follow_basins(cubic, "a", [2.2, 0.5, 2.2], grid, most=0.5)
+    assert np.all(found.shares[1] * found.shares[0] == 0)
+    assert np.all(found.shares[2] * found.shares[0] == 0)
+    np.testing.assert_allclose(found.shares.sum(axis=1), 1.0)
 
 
 def test_nobody_can_start():

@@ -15,11 +15,13 @@ walls = np.linspace(0.0, 0.4, 9)
 found = sweeps.follow_basins(system, "wall", walls, grid, turns=200)
 
 # label each attractor where its basin is largest; small basins share one band
-large = found.shares.max(axis=0) > 0.03
-names = found.names[found.shares.argmax(axis=0), np.arange(len(large))]
-bands = [*found.shares.T[large], found.shares.T[~large].sum(axis=0)]
+most = found.shares.max(axis=0)
+names = found.names[found.shares.argmax(axis=0), np.arange(len(most))]
+order = np.argsort(-most)
+large, small = order[most[order] > 0.03], order[most[order] <= 0.03]
+bands = [*found.shares.T[large], found.shares.T[small].sum(axis=0)]
 words = [*names[large], "others"]
-colours = [*(f"C{k}" for k in range(large.sum())), "0.6"]
+colours = [*(f"C{k}" for k in range(len(large))), "0.6"]
 
 with style():
     figure, ax = plt.subplots()

@@ -83,8 +83,9 @@ def follow_basins(
     values = as_values(values)
     made: list[Basins] = []
     numbers: list[np.ndarray] = []
-    # the latest orbit of each attractor
-    latest: list[np.ndarray] = []
+    # the numbers of the attractors at the previous value, and their orbits; one that
+    # vanishes is not matched with whatever appears later
+    count, before, latest = 0, np.zeros(0, dtype=int), ()
     for k, value in enumerate(values):
         moved = eqx.tree_at(picked, section.system, jnp.asarray(value))
         own = eqx.tree_at(lambda s: s.system, section, moved)
@@ -92,17 +93,14 @@ def follow_basins(
         one = basins(own, grid, turns, out=folder, progress=progress, **options)
         pairs = match_orbits(latest, one.orbits, one.scale, most)
         given = np.empty(len(one.names), dtype=int)
-        for i, orbit in enumerate(one.orbits):
-            if i in pairs:
-                given[i] = pairs[i]
-                latest[given[i]] = orbit
-            else:
-                given[i] = len(latest)
-                latest.append(orbit)
+        for i in range(len(one.names)):
+            given[i] = before[pairs[i]] if i in pairs else count
+            count += i not in pairs
+        before, latest = given, one.orbits
         made.append(one)
         numbers.append(given)
-    shares = np.zeros((len(values), len(latest)))
-    names = np.full((len(values), len(latest)), "", dtype=object)
+    shares = np.zeros((len(values), count))
+    names = np.full((len(values), count), "", dtype=object)
     for k, (one, given) in enumerate(zip(made, numbers, strict=True)):
         for name, number in zip(one.names, given, strict=True):
             shares[k, number] = one.shares[name].share

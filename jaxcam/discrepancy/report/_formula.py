@@ -126,11 +126,18 @@ def formula_of(
 
 
 def _with_positive_size(form: Primitive, numbers: np.ndarray) -> np.ndarray:
-    """Return the parameters of an oscillation with a positive amplitude."""
-    if form.name.split()[0] not in ("wave", "harmonic") or numbers[0] >= 0:
+    """Return the parameters of an oscillation with a positive amplitude and a positive
+    wave number.
+    """
+    kind = form.name.split()[0]
+    if kind not in ("wave", "harmonic"):
         return numbers
     size, *others, phase = numbers
-    return np.array([-size, *others, phase + math.pi])
+    if kind == "wave" and others[0] < 0:
+        others, phase = [-others[0]], -phase
+    if size < 0:
+        size, phase = -size, phase + math.pi
+    return np.array([size, *others, phase])
 
 
 def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
