@@ -313,7 +313,7 @@ def test_a_slip_that_the_last_impact_reverses_goes_on_in_contact(restitution):
     Of a velocity of 1 m/s, a restitution of 1e-9 changes times by 1e-9 s; it only makes
     sure that contact does not begin exactly at the impact.
     """
-    system = Coupled(restitution=jnp.asarray(restitution))
+    system = Coupled(restitution=restitution)
     run = jaxcam.simulate(system, [0.0095, 0.0, -0.9, -0.05], 0.0, 0.4)
     assert run.successful, run.result
     assert run.impacts.count == 1 and run.contacts.start.shape == (1,)
@@ -323,6 +323,7 @@ def test_a_slip_that_the_last_impact_reverses_goes_on_in_contact(restitution):
     slows = 5 - 10 * (0.5 - 0.2) / (1 - 0.2 * 0.5)
     stop = 0.01 + slip / slows
     switches = run.switches
+    assert switches is not None
     np.testing.assert_allclose(switches.time, [0.01, stop], rtol=0, atol=1e-8)
     np.testing.assert_allclose(switches.after[0][3], slip, rtol=1e-8)
     at_rest = np.asarray(run.at(jnp.array([0.39])))[0]

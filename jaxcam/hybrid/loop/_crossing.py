@@ -108,7 +108,7 @@ def sides_after(
     across = hit[functions.m :]
     if not functions.slidable:
         flags = [a ^ b for a, b in zip(negative, across, strict=True)]
-        return Sides(tuple(flags), tuple(sliding), [])
+        return Sides(tuple(flags), tuple(sliding), [], [])
     shares = functions.shares(t, made.raw, carried.mode)
     across = _leaving_together(functions, carried, shares, across)
     heights, blur = functions.heights(t, x, carried.extents, carried.mode)
