@@ -65,8 +65,8 @@ def _closing(layout: Layout, pieces: Pieces, point: Point):
         ends = jax.vmap(lambda *a: end_of_flight(model, *a, substeps=substeps))(*inputs)
         times = part.start + part.step * part.place.shape[-2]
 
-        def derivatives(t, x, drive):
-            system = model.driven(t, drive)
+        def derivatives(t, x, drive, step):
+            system = model.during(t - step / 2, drive)(t)
 
             def along(function):
                 def rate(t, x):
@@ -81,7 +81,8 @@ def _closing(layout: Layout, pieces: Pieces, point: Point):
             rate = along(gap)
             return gap(t, x), rate(t, x), along(rate)(t, x)
 
+        # in the middle of the last step
         last = DriveState(*(part[:, -1] for part in pieces.drive))
-        return jax.vmap(derivatives)(times, ends[:, :size], last)
+        return jax.vmap(derivatives)(times, ends[:, :size], last, part.step)
 
     return jax.vmap(one)(point.values, point.states, pieces)
