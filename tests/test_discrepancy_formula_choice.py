@@ -145,3 +145,47 @@ def test_a_form_that_leaves_little_needs_no_sum(chosen):
     sums = {both: (4930.0, 960.0)}
     _, tried = chosen({wave: (40.0, 1011.0)}, sums, gain=5000.0, small=1000.0)
     assert tried == ["wave"]
+
+
+def test_forms_are_compared_on_pieces_where_the_curve_leaves_more(
+    monkeypatch, unchecked_types
+):
+    """The curve costs three per sample. Of the forms, the one with the largest
+    predicted gain costs more than twice the least on single pieces, and one fails."""
+    forms = {"bump": 2313.0, "power": 1100.0, "line": 1050.0, "step": None}
+    samples = types.SimpleNamespace(samples=1000)
+    curve = _trial(3000.0, 3000.0)
+    curve.problem, apart = samples, types.SimpleNamespace(samples=1000)
+    tried = []
+
+    def on_pieces(fits, found, apart, one, start, small):
+        tried.append(start.primitive)
+        cost = forms[start.primitive]
+        return None if cost is None else _trial(cost + 10.0, cost)
+
+    monkeypatch.setattr(_formulas, "_on_pieces", on_pieces)
+    monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
+    monkeypatch.setattr(_formulas, "shows_apart", lambda family: True)
+    fits = types.SimpleNamespace(policy=Policy())
+    one = types.SimpleNamespace(family=None, slot="force_a")
+    starts = [
+        _formulas.Start(9e3 - k, Form(name), None) for k, name in enumerate(forms)
+    ]
+
+    def said(*words):
+        pass
+
+    def compared(found, apart):
+        given = fits, found, apart, one, 1e5, said, Clock(1.0)
+        return _formulas._Trials(*given).compared(starts)
+
+    found = compared(curve, apart)
+    assert tried == list(forms)
+    assert [start.primitive for start in found] == ["line", "power"]
+    # in the units of predicted gains, which are divided by the cost per sample
+    assert [start.gain for start in found] == [-1060.0 / 3, -1110.0 / 3]
+    # where the curve leaves noise alone, its predictions are reliable
+    noise = _trial(1010.0, 1000.0)
+    noise.problem = samples
+    assert compared(noise, apart) == starts
+    assert compared(curve, samples) == starts

@@ -57,7 +57,7 @@ def test_a_function_that_explains_much_is_not_fitted_without(
     tried = []
 
     def fitted(subset, point, beaten):
-        tried.append(subset)
+        tried.append((subset, beaten))
         return _found(["a"], 1010.0)
 
     one = object.__new__(LeftOut)
@@ -67,8 +67,10 @@ def test_a_function_that_explains_much_is_not_fitted_without(
         LeftOut, "predicted_loss", lambda self, found, out: losses[out.slot]
     )
     monkeypatch.setattr(LeftOut, "subset", lambda self, found, out: (out.slot, None))
-    found = one.pruned(_found(["a", "b"], 1000.0), lambda found: 100.0)
-    assert tried == ["b"] and len(found.functions) == 1
+    whole = _found(["a", "b"], 1000.0)
+    found = one.pruned(whole, lambda found: 100.0)
+    # a fit that costs more than is allowed for need not be finished
+    assert tried == [("b", whole.score + 100.0)] and len(found.functions) == 1
 
 
 def test_a_diverging_motion_has_no_information():

@@ -272,13 +272,19 @@ def test_a_term_that_is_not_significant_states_its_size_and_the_size_required():
 def test_an_explanation_that_explains_less_states_its_share_of_the_misfit():
     """Of the costs 500 to 100 of 100 samples, one that leaves 400 explains 25 %."""
 
-    def fit(cost) -> Any:
-        return SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=100))
+    def fit(cost, free=("a", "b")) -> Any:
+        problem = SimpleNamespace(samples=100)
+        return SimpleNamespace(cost=cost, problem=problem, free=free)
 
     textbook, best = fit(500.0), fit(100.0)
-    for cost, words in ((400.0, "25.0%"), (499.9, "none"), (100.1, "almost all")):
+    for cost, words in ((400.0, "25.0%"), (499.9, "none")):
         reason = explains_less(textbook, fit(cost), best)
         assert reason.startswith(f"explains {words} of what the verdict explains")
+    for cost in (100.1, 95.0):
+        more = explains_less(textbook, fit(cost, ("a", "b", "c")), best)
+        assert more.startswith("explains as much, but with more parameters (1): ")
+        same = explains_less(textbook, fit(cost), best)
+        assert same.startswith("explains as much, but with a larger BIC: ")
     half = explains_less(textbook, fit(400.0), best)
     assert half.endswith("its residual is 2 times the noise, that of the verdict 1")
 

@@ -16,7 +16,9 @@ from ..problem import Monitor
 CHANGE = "change of events"
 """Kind of a change that has no name of its own."""
 
-# Just beyond a grazing, the times of its events vary as the square root of the errors.
+# Largest difference between the half periods of a symmetric orbit, as a fraction of the
+# period: just beyond a grazing, the times of events vary as the square root of the
+# errors
 _SYMMETRIC = 1e-4
 
 _MODE = ("contacts", "sides", "sliding")

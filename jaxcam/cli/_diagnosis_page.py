@@ -109,11 +109,11 @@ def _own_gains(found: Diagnosis) -> list[str]:
     gain = max(effect.heldout_gain_nats for effect in found.effects)
     with_all = math.sqrt(found.after.cost / found.after.problem.samples)
     return [
-        '<p class="note">The residual / noise is the rms residual of all samples if '
-        "this effect alone is removed and everything else is fitted again, in units "
-        f"of the sensor noise; it is {with_all:.3g} with all effects. Delta BIC is the "
-        "BIC with the effect minus that without it. Together, the effects increase "
-        f"the log-likelihood of held-out data by {gain:.3g}.</p>"
+        '<p class="note">The residual / noise is the predicted rms residual of all '
+        "samples if this effect alone is removed and everything else is adjusted, in "
+        f"units of the sensor noise; it is {with_all:.3g} with all effects. Delta BIC "
+        "is the BIC with the effect minus that without it. Together, the effects "
+        f"increase the log-likelihood of held-out data by {gain:.3g}.</p>"
     ]
 
 

@@ -56,13 +56,14 @@ class Needs(NamedTuple):
 
     - `inclusion`: fraction of the bootstrap samples that would retain a part.
     - `deviation`: standard deviation of each free parameter over the bootstrap samples.
-    - `lost`: increase in the cost of all data if a part is removed, minus the penalty
-      for its parameters.
+    - `lost`: predicted increase in the cost of all data if a part is removed, minus the
+      penalty for its parameters. `worse`: the same, without the penalty.
     """
 
     inclusion: dict[str, float]
     deviation: dict[str, float]
     lost: dict[str, float]
+    worse: dict[str, float]
 
 
 def redrawn(
@@ -129,7 +130,9 @@ def needs(
     deviation = dict.fromkeys(found.free, 0.0)
     deviation |= {blocks.names[k]: float(s) for k, s in zip(free, spread)}
     shares = {name: k / policy.bootstrap for name, k in kept.items()}
-    return Needs(shares, deviation, lost(None)[1])
+    net = lost(None)[1]
+    worse = {name: net[name] + prices[name] for name in net}
+    return Needs(shares, deviation, net, worse)
 
 
 def _inside(found: Fit) -> list[str]:

@@ -179,10 +179,14 @@ def explains_less(textbook: Fit, found: Fit, best: Fit) -> str:
     samples = best.problem.samples
     rms, least = (math.sqrt(one.cost / samples) for one in (found, best))
     left = f"its residual is {rms:.3g} times the noise, that of the verdict {least:.3g}"
-    if not math.isfinite(share):
+    part = f"{max(share, 0.0):.1%}" if math.isfinite(share) else ""
+    if found.cost <= best.cost or part == "100.0%":
+        more = len(found.free) - len(best.free)
+        words = f"more parameters ({more})" if more > 0 else "a larger BIC"
+        return f"explains as much, but with {words}: {left}"
+    if not part:
         return f"explains less: {left}"
-    part = f"{max(share, 0.0):.1%}"
-    part = {"0.0%": "none", "100.0%": "almost all"}.get(part, part)
+    part = {"0.0%": "none"}.get(part, part)
     return f"explains {part} of what the verdict explains: {left}"
 
 

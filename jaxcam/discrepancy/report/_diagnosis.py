@@ -85,8 +85,8 @@ class Effect:
     share. `None` for the drive, which is diagnosed from its own channel.
     """
     rms_without: float | None = None
-    """Rms residual, in units of the noise, if this effect alone is removed and the
-    others are fitted again; `None` if there is no such fit.
+    """Predicted rms residual, in units of the noise, if this effect alone is removed
+    and everything else is adjusted; `None` if there is no prediction.
     """
 
     def to_json(self) -> dict[str, Any]:

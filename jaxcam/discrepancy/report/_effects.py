@@ -101,7 +101,7 @@ def missing_effects(
         inclusion=min(needs.inclusion[label] for label in labels),
         term=False,
         share=sum(divided.of[label] for label in labels),
-        rms_without=_rms_without(fitted, needs.lost[labels[0]])
+        rms_without=_rms_without(fitted, needs.worse[labels[0]])
         if len(labels) == 1
         else None,
     )
@@ -116,7 +116,7 @@ def missing_effects(
             needs.inclusion[name],
             policy,
             divided.of[name],
-            _rms_without(fitted, needs.lost[name]),
+            _rms_without(fitted, needs.worse[name]),
         )
         for name in sorted(missing.names)
     ]

@@ -109,7 +109,7 @@ class _Trials:
         sound = [(start, fit) for start, fit in fits if fit and _sound(fit, self.one)]
         least = min((fit.fit.cost for _, fit in sound), default=math.inf)
         return [
-            start._replace(gain=-fit.score)
+            start._replace(gain=-fit.score / heat_of(found.fit))
             for start, fit in sorted(sound, key=lambda pair: pair[1].score)
             if fit.fit.cost <= policy.hopeless_cost * least
         ]

@@ -15,6 +15,8 @@ from ._step import Step
 # just after a crossing, a distance below this fraction of the largest one so far is an
 # error of event location
 _NEAR = 1e-9
+# the share of sliding is that of a force at its limit to within this
+_AT_LIMIT = 1e-9
 # the scale of the distance from a surface is at least the distance that the motion
 # covers in this fraction of the longest step
 _SHORT = 1e-3
@@ -140,7 +142,7 @@ def _leaving_together(functions: Functions, carried: LoopState, shares, across):
     found = list(across)
     for k in functions.slidable:
         left = (shares[k] + slack[k]) * (1 + slack[k] - shares[k])
-        found[k] = found[k] | (ends & carried.sliding[k] & (left <= _NEAR))
+        found[k] = found[k] | (ends & carried.sliding[k] & (left <= _AT_LIMIT))
     return found
 
 

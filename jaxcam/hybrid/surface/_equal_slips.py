@@ -2,7 +2,8 @@
 
 The feet of a rigid body that rests flat on a floor slip at the same velocity. Their
 friction forces are then statically indeterminate: only the sum is determined. It is
-shared in proportion to the limits of these forces, so the feet begin to slip together.
+divided in proportion to the forces during slip, so both feet begin to slip at the same
+instant.
 """
 
 import jax.numpy as jnp
@@ -18,9 +19,10 @@ _EQUAL = 1e-9
 def solve_equal_slips(gains, right, mask, shift):
     """Return the solution for the masked unknowns, zero elsewhere.
 
-    Of two surfaces with the same slip velocity, the second has the weight of the first,
-    measured from half the distance between the sides, `shift`: b_2 - shift / 2 =
-    s (b_1 - shift / 2), where s = -1 if the motion came from opposite sides.
+    Of two surfaces with the same slip velocity, the second has the weight of the first.
+    Weights are measured from `shift` / 2, the middle between the sides:
+    b_2 - shift / 2 = s (b_1 - shift / 2), where s = -1 if the two slip velocities have
+    opposite signs.
 
     **Arguments:** the changes of the slopes (rows) by the weights (columns), the wanted
     changes, the surfaces on which the motion slides, and 1, or 0 if the unknowns are

@@ -10,7 +10,7 @@ from ._kinks import find_kinks, WINDOW
 from ._polynomial import fit_local, LocalFit, usual_degree
 
 
-# Longest stretch (s) that is fitted, and minimum number of samples when it is shortened
+# Usual length (s) of the stretch that is fitted, and its minimum number of samples
 _FIT_WINDOW, _FEWEST = 0.1, 16
 # Number of samples in the longest stretch below which a higher degree is tried before
 # the stretch is shortened: its highest degree, and minimum number of samples per
