@@ -201,7 +201,7 @@ def test_missing_samples_a_gap_and_a_slip():
         runs += mended.recordings
         notes += mended.notes
     words = " ".join(notes)
-    assert "dropped" in words and "a turn" in words and "split" in words
+    assert "are missing" in words and "a turn" in words and "split" in words
     assert len(runs) == 4
     again = fitting.fit(cam_problem(runs))
     assert again.converged

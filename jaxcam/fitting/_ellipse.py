@@ -51,11 +51,11 @@ class Ellipse:
         off = (np.asarray(points, dtype=float) - self.centre) @ np.linalg.pinv(
             self._roots()
         ).T
-        return np.sum(off**2, axis=-1)
+        return np.asarray(np.sum(off**2, axis=-1))
 
     def contains(self, points: Float[np.ndarray, "*k d"]) -> Bool[np.ndarray, "*k"]:
         """Return whether points lie inside the region."""
-        return self.chi_square(points) <= self.limit
+        return np.asarray(self.chi_square(points) <= self.limit)
 
     def polygon(self, points: int = 181) -> Float[np.ndarray, "k 2"]:
         """Return the boundary of an ellipse as a closed line for plotting, shape
