@@ -42,7 +42,7 @@ def chosen(monkeypatch, unchecked_types):
                 if gain
             ]
 
-        def fitted(fits, found, apart, one, start, small, first=None):
+        def fitted(self, start):
             _, primitive, numbers = start
             tried.append(primitive.name)
             if primitive.special is None and numbers is not None:
@@ -61,7 +61,7 @@ def chosen(monkeypatch, unchecked_types):
         search = types.SimpleNamespace(promising=lambda _: ranked(sums))
         monkeypatch.setattr(_formulas, "SumSearch", lambda *_: search)
         monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
-        monkeypatch.setattr(_formulas, "_fitted", fitted)
+        monkeypatch.setattr(_formulas._Trials, "_fitted", fitted)
         fits = types.SimpleNamespace(policy=Policy())
         found, _ = _formulas.formulated(
             fits, curve, None, small, lambda *_: None, Clock(1.0)
@@ -158,12 +158,12 @@ def test_forms_are_compared_on_pieces_where_the_curve_leaves_more(
     curve.problem, apart = samples, types.SimpleNamespace(samples=1000)
     tried = []
 
-    def on_pieces(fits, found, apart, one, start, small):
+    def on_pieces(self, start):
         tried.append(start.primitive)
         cost = forms[start.primitive]
         return None if cost is None else _trial(cost + 10.0, cost)
 
-    monkeypatch.setattr(_formulas, "_on_pieces", on_pieces)
+    monkeypatch.setattr(_formulas._Trials, "_on_pieces", on_pieces)
     monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
     monkeypatch.setattr(_formulas, "shows_apart", lambda family: True)
     fits = types.SimpleNamespace(policy=Policy())

@@ -172,7 +172,8 @@ class _Rig:
     sensors: Mapping[str, Sensor] | None
     parameters: Sequence[Parameter]
     drive: Turning | Input | None
-    # segments that were found, which do not depend on the location
+    # segments that were found, which do not depend on the location, by recordings (all
+    # of which exist as long as the diagnosis) and lags
     _cut: dict[Hashable, tuple[Setup, tuple[Segments, ...]]] = dataclasses.field(
         default_factory=dict
     )

@@ -95,16 +95,13 @@ class _Trials:
         one is then left out.
         """
         policy, found = self.fits.policy, self.found
-        alone = self.apart is found.problem or not shows_apart(self.one.family)
-        if alone or len(starts) < 2 or leaves_noise(self.fits, found):
+        if len(starts) < 2 or not self._shows_apart or leaves_noise(self.fits, found):
             return starts
         for start in starts:
             if self.clock.over:
                 return starts
             self.progress(f"fitting a formula: {start.primitive.name}", None)
-            self.on_pieces[start.primitive.name] = _on_pieces(
-                self.fits, found, self.apart, self.one, start, self.small
-            )
+            self.on_pieces[start.primitive.name] = self._on_pieces(start)
         fits = [(start, self.on_pieces[start.primitive.name]) for start in starts]
         sound = [(start, fit) for start, fit in fits if fit and _sound(fit, self.one)]
         least = min((fit.fit.cost for _, fit in sound), default=math.inf)
@@ -130,10 +127,7 @@ class _Trials:
                 continue
             done.add(form.name)
             self.progress(f"fitting a formula: {form.name}", None)
-            first = self.on_pieces.get(form.name)
-            trial = _fitted(
-                self.fits, self.found, self.apart, self.one, start, self.small, first
-            )
+            trial = self._fitted(start)
             if trial is None or not _sound(trial, self.one):
                 continue
             self.sound.append(trial)
@@ -153,6 +147,60 @@ class _Trials:
         lost = heat_of(self.found.fit) * (likelihood.gain - start.gain - price)
         worse = lost + price - likelihood.freedom
         return worse < self.fits.policy.form_loss + self.fits.policy.lead_bic
+
+    @property
+    def _shows_apart(self) -> bool:
+        """Whether disconnected pieces contain information on the function."""
+        return self.apart is not self.found.problem and shows_apart(self.one.family)
+
+    @property
+    def _beaten(self) -> float:
+        """The cost below which a form explains about as much as the function."""
+        cost = self.found.fit.cost
+        return max(self.fits.policy.form_cost * cost, cost + self.small)
+
+    def _in_place(self, start: Start) -> tuple[tuple[Part, ...], Point]:
+        """Return the functions of the fit with a form in place of one of them, and a
+        start for their fit.
+        """
+        found, one, problem = self.found, self.one, self.found.problem
+        size = Roughness(size=abs(float(start.numbers[0])))
+        form = dataclasses.replace(one, primitive=start.primitive, roughness=size)
+        functions = tuple(form if f.slot == one.slot else f for f in found.functions)
+        values = emptied(problem, found.fit.point.values, one.slot)
+        columns = [problem.names.index(name) for name in form.coefficients]
+        values = replaced(values, columns, start.numbers)
+        return functions, found.fit.point._replace(values=values)
+
+    def _on_pieces(self, start: Start) -> Missing | None:
+        """Fit a form in place of the function to disconnected pieces: an almost linear
+        problem.
+
+        **Returns:** the fit, or `None` if the form explains much less than the
+        function.
+        """
+        functions, point = self._in_place(start)
+        subset = Subset(self.apart, functions, self.found.names)
+        return self._unless_beaten(subset, point)
+
+    def _fitted(self, start: Start) -> Missing | None:
+        """Fit a form in place of the function to whole recordings.
+
+        **Returns:** the fit, or `None` if the form explains much less than the
+        function.
+        """
+        functions, point = self._in_place(start)
+        if self._shows_apart:
+            first = self.on_pieces.get(start.primitive.name) or self._on_pieces(start)
+            if first is None:
+                return None
+            point, functions = first.fit.point, first.functions
+        subset = Subset(self.found.problem, functions, self.found.names)
+        return self._unless_beaten(subset, point)
+
+    def _unless_beaten(self, subset: Subset, point: Point) -> Missing | None:
+        trial = self.fits.fitted(subset, point, beaten=self._beaten)
+        return trial if trial.fit.cost < self._beaten else None
 
 
 def _in_slot(found: Missing, slot: str):
@@ -179,70 +227,3 @@ def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     return found.fit.cost < samples + max(
         surplus, fits.policy.negligible_residual * small
     )
-
-
-def _in_place(
-    found: Missing, one: Free, start: Start
-) -> tuple[tuple[Part, ...], Point]:
-    """Return the functions of a fit with a form in place of one of them, and a start
-    for their fit.
-    """
-    problem, numbers = found.problem, start.numbers
-    size = Roughness(size=abs(float(numbers[0])))
-    form = dataclasses.replace(one, primitive=start.primitive, roughness=size)
-    functions = tuple(form if f.slot == one.slot else f for f in found.functions)
-    values = emptied(problem, found.fit.point.values, one.slot)
-    columns = [problem.names.index(name) for name in form.coefficients]
-    values = replaced(values, columns, numbers)
-    return functions, found.fit.point._replace(values=values)
-
-
-def _beaten(fits: FreeFits, found: Missing, small: float) -> float:
-    """Return the cost below which a form explains about as much as the function."""
-    return max(fits.policy.form_cost * found.fit.cost, found.fit.cost + small)
-
-
-def _on_pieces(
-    fits: FreeFits,
-    found: Missing,
-    apart: Problem,
-    one: Free,
-    start: Start,
-    small: float,
-) -> Missing | None:
-    """Fit a form in place of a function to disconnected pieces: an almost linear
-    problem.
-
-    **Returns:** the fit, or `None` if the form explains much less than the function.
-    """
-    functions, point = _in_place(found, one, start)
-    beaten = _beaten(fits, found, small)
-    first = fits.fitted(Subset(apart, functions, found.names), point, beaten=beaten)
-    return first if first.fit.cost < beaten else None
-
-
-def _fitted(
-    fits: FreeFits,
-    found: Missing,
-    apart: Problem,
-    one: Free,
-    start: Start,
-    small: float,
-    first: Missing | None = None,
-) -> Missing | None:
-    """Fit a form in place of a function to whole recordings.
-
-    **Arguments:** `first`: its fit to disconnected pieces, if there is one already.
-
-    **Returns:** the fit, or `None` if the form explains much less than the function.
-    """
-    functions, point = _in_place(found, one, start)
-    if apart is not found.problem and shows_apart(one.family):
-        first = first or _on_pieces(fits, found, apart, one, start, small)
-        if first is None:
-            return None
-        point, functions = first.fit.point, first.functions
-    subset = Subset(found.problem, functions, found.names)
-    beaten = _beaten(fits, found, small)
-    trial = fits.fitted(subset, point, beaten=beaten)
-    return trial if trial.fit.cost < beaten else None
