@@ -66,7 +66,8 @@ def _impulses(matrix, apart, along, velocities, coefficients, closed, newton: bo
     number = len(closed)
     slips, before = velocities[:number], velocities[number:]
     # slips far below the changes that the impact causes are rounding errors
-    changes = jnp.abs(matrix[:number, number:]) @ jnp.abs(before)
+    pressing = jnp.where(closed, jnp.abs(before), 0.0)
+    changes = jnp.abs(matrix[:number, number:]) @ pressing
     slipping = _largest(jnp.maximum(jnp.abs(slips), changes), closed)
     sizes = jnp.repeat(jnp.stack([slipping, _largest(before, closed)]), number)
     pressed = contact_impulses(matrix, velocities, closed, sizes)
