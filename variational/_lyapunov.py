@@ -164,10 +164,10 @@ def _check(system, turns: int, transient: int, turn, blocks: int, paired: bool) 
 
 
 def _refuse_hysteresis(system) -> None:
-    switched = isinstance(system, SwitchedSystem)
-    if switched and np.any(np.asarray(system.hysteresis) != 0):
+    if isinstance(system, SwitchedSystem) and system.remembers:
         raise ValueError(
-            "lyapunov_spectrum supports hysteresis only with the LLVM backend, because "
+            "lyapunov_spectrum supports hysteresis and modes only with the LLVM "
+            "backend, because "
             "XLA differentiates period by period, and the state at the start of a "
             'period does not determine the side; use Settings(backend="llvm"), or '
             "differentiate jaxcam.hybrid.flow over the whole motion with jax.jacfwd"

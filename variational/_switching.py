@@ -71,7 +71,10 @@ def switching_saltation(
             "the motion slides before the event; pass the side on which it continues, "
             "such as after=1.0"
         )
-    here = np.arange(old.shape[0]) == surface
+    changed = (
+        (surface,) if after is not None else system.sides_changed(len(old))[surface]
+    )
+    here = np.isin(np.arange(old.shape[0]), changed)
     new = xp.where(here, -old if after is None else after, old)
     slides = not traced and (old[surface] == 0 or new[surface] == 0)
     before, beyond = _in_mode(system, old, x), _in_mode(system, new, x)

@@ -8,6 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from ..hybrid import Trajectory
+from ..hybrid.record import automaton
 from ..models import CamFollower, rad_s_to_rpm
 from ._parameters import parameters
 
@@ -94,6 +95,10 @@ def summary(name: str, trajectory: Trajectory) -> str:
     span = f"from {began:.6g} to {reached:.6g}{unit and f' {unit}'}"
     kept = bool(np.any(trajectory.steps.contact[-1]))
     last = "in contact" if kept else "in flight"
+    if automaton(system) is not None:
+        mode = f"in mode {trajectory.modes.names()[-1]}"
+        free = not trajectory.steps.contact.shape[1]
+        last = mode if free else f"{last} and {mode}"
     stopped = "" if bool(trajectory.successful) else "stopped early, "
     return f"{name}{at}, {span}: {', '.join(counts)}; {stopped}{last} at the end."
 
@@ -128,8 +133,32 @@ def about(trajectory: Trajectory) -> dict[str, Any]:
             "released": contacts.released,
             "constraint": contacts.constraint,
         },
+        **_switching(trajectory),
         "final": {"time": trajectory.steps.time[-1], "state": trajectory.final},
     }
+
+
+def _switching(trajectory: Trajectory) -> dict[str, Any]:
+    """Return the events at switching surfaces, and the modes, if there are any."""
+    switches, found = trajectory.switches, {}
+    if switches is not None:
+        found["switches"] = {
+            "count": int(switches.count),
+            "time": switches.time,
+            "before": switches.before,
+            "after": switches.after,
+            "surface": switches.surface,
+            "direction": switches.direction,
+            "kind": switches.kind,
+        }
+    if automaton(trajectory.system) is not None:
+        modes = trajectory.modes
+        found["modes"] = {
+            "name": modes.names(),
+            "start": modes.start,
+            "end": modes.end,
+        }
+    return found
 
 
 def draw(trajectory: Trajectory, folder: Path) -> list[Path]:

@@ -5,6 +5,7 @@ and Application of Bifurcations in Systems with Impacts and Chattering*, Univers
 Naples Federico II, 2008; `jaxcam.citation("thesis")` prints its entry.
 """
 
+from ._automaton import HybridAutomaton as HybridAutomaton
 from ._corners import Corner as Corner, corners as corners
 from ._flow import flow as flow
 from ._settings import Settings as Settings

@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ._system import HybridSystem
@@ -93,6 +94,22 @@ class SwitchedSystem(HybridSystem):
         """
         return jax.vmap(lambda one: self.branch(t, state, one))(sides)
 
+    def distances(
+        self, t: RealScalar, state: State, sides: Float[Array, " k"]
+    ) -> Float[Array, " k"]:
+        """Return the distances of a motion from the surfaces at which it will switch.
+
+        Args:
+            t: Time (s).
+            state: State, shape `(n,)`.
+            sides: +1 or -1 for each surface, shape `(k,)`.
+
+        Returns:
+            Positive before a switch and zero at it, shape `(k,)`: by default, the
+                switching functions times the sides, plus the hysteresis.
+        """
+        return sides * jnp.atleast_1d(self.switching(t, state)) + self.hysteresis
+
     def vector_field(self, t: RealScalar, state: State) -> State:
         """Return the rate of change on the sides that `sides` gives for this state."""
         return self.branch(t, state, self.sides(t, state))
@@ -125,6 +142,32 @@ class SwitchedSystem(HybridSystem):
         """
         values = jnp.atleast_1d(self.switching(t, state))
         return jnp.where(values >= 0, 1.0, -1.0)
+
+    @property
+    def one_way(self) -> int:
+        """Return how many surfaces, which come first, are transitions between modes.
+
+        A motion does not slide along them. It is zero except in a `HybridAutomaton`.
+        """
+        return 0
+
+    @property
+    def remembers(self) -> bool:
+        """Return whether the sides depend on the past, and not on the state alone:
+        by default, whether there is hysteresis.
+        """
+        return bool(np.any(np.asarray(self.hysteresis) > 0))
+
+    def sides_changed(self, number: int) -> tuple[tuple[int, ...], ...]:
+        """Return, for each surface, the surfaces whose sides change at its crossing.
+
+        Args:
+            number: Number of surfaces.
+
+        Returns:
+            Indices of surfaces: by default, each surface only changes its own side.
+        """
+        return tuple((k,) for k in range(number))
 
     @property
     def hysteresis(self) -> Any:

@@ -116,6 +116,10 @@ class SwitchedWrapping(Wrapping, SwitchedSystem):
         """Return the switching functions of the inner system."""
         return self.inner.switching(t, state)
 
+    def distances(self, t, state, sides):
+        """Return the distances of the inner system."""
+        return self.inner.distances(t, state, sides)
+
     def branch(self, t, state, sides):
         """Return the rates of the inner system."""
         return self.inner.branch(t, state, sides)
@@ -135,6 +139,20 @@ class SwitchedWrapping(Wrapping, SwitchedSystem):
     def impact(self, t, state):
         """Return the states after the impacts of the inner system."""
         return self.inner.impact(t, state)
+
+    def sides_changed(self, number: int) -> tuple[tuple[int, ...], ...]:
+        """Return, for each surface, the surfaces whose sides change at its crossing."""
+        return self.inner.sides_changed(number)
+
+    @property
+    def one_way(self) -> int:
+        """Return the number of transitions between modes."""
+        return self.inner.one_way
+
+    @property
+    def remembers(self) -> bool:
+        """Return whether the sides depend on the past."""
+        return self.inner.remembers
 
     @property
     def hysteresis(self) -> Any:

@@ -10,6 +10,7 @@ from jax.errors import (
     TracerIntegerConversionError,
 )
 
+from ._automaton import HybridAutomaton
 from ._identity import digest_of, structure_of
 from ._prepared import prepared
 from ._settings import Settings
@@ -148,6 +149,8 @@ def check_system(system, t0, state, settings: Settings) -> None:
             )
     ready = prepared(system)
     if signature not in _WELL_SHAPED:
+        if isinstance(ready, HybridAutomaton):
+            _check_modes(ready, t0, state)
         _check_shapes(ready, t0, state)
     system.check()
     if isinstance(system, SwitchedSystem):
@@ -166,6 +169,44 @@ def _check_switches(system: SwitchedSystem) -> None:
         raise ValueError(f"hysteresis is {system.hysteresis}; it cannot be negative")
     if not np.all(np.asarray(system.holding) >= 1):
         raise ValueError(f"holding is {system.holding}; it must be at least one")
+
+
+def _check_modes(system: HybridAutomaton, t0, state) -> None:
+    """Raise `ValueError` for an undefined mode, one that no transition meets, or an
+    array of a wrong shape.
+    """
+    name, transitions = type(system).__name__, len(system.transitions)
+    met = {mode for pair in system.transitions for mode in pair}
+    if unknown := sorted(met - set(system.modes)):
+        raise ValueError(
+            f"transitions of {name} name the modes {', '.join(unknown)}, which `modes` "
+            f"does not contain; it contains {', '.join(system.modes)}"
+        )
+    if unused := [mode for mode in system.modes if mode not in met]:
+        raise ValueError(
+            f"no transition of {name} begins or ends in {', '.join(unused)}; add a "
+            "transition, or leave the mode out"
+        )
+    if loops := [before for before, after in system.transitions if before == after]:
+        raise ValueError(
+            f"a transition of {name} leads from {loops[0]} to {loops[0]}; add a second "
+            "mode with the same vector field"
+        )
+    own = _shape(system, "surfaces", t0, state)
+    sides = jax.ShapeDtypeStruct((own.size,), jnp.float64)
+    n = state.shape[0]
+    for method, more, shape, each in (
+        ("fields", (sides,), (len(system.modes), n), "mode"),
+        ("guards", (), (transitions,), "transition"),
+        ("resets", (), (transitions, n), "transition"),
+        ("start_mode", (), (), ""),
+    ):
+        found = _shape(system, method, t0, state, *more).shape
+        if found != shape:
+            rows = f"one row for each {each}" if each else "one index"
+            raise ValueError(
+                f"{method} of {name} returns shape {found}; return {shape}, {rows}"
+            )
 
 
 def _check_shapes(system, t0, state) -> None:

@@ -40,6 +40,13 @@ class WithSection(Wrapping, SwitchedSystem):
         last = jnp.asarray(self.function(t, state), dtype=jnp.float64)
         return jnp.append(jnp.atleast_1d(own), last)
 
+    def distances(self, t, state, sides):
+        """Return the distances from the surfaces of the system and from the section."""
+        own = jnp.zeros(0)
+        if isinstance(self.system, SwitchedSystem):
+            own = self.system.distances(t, state, sides[:-1])
+        return jnp.append(own, sides[-1] * self.function(t, state))
+
     def branch(self, t, state, sides):
         """Return the rates of the system."""
         if isinstance(self.system, SwitchedSystem):
@@ -65,6 +72,17 @@ class WithSection(Wrapping, SwitchedSystem):
     def impact(self, t, state):
         """Return the states after the impacts of the system."""
         return self.system.impact(t, state)
+
+    def sides_changed(self, number: int) -> tuple[tuple[int, ...], ...]:
+        """Return, for each surface, the surfaces whose sides change at its crossing."""
+        if not isinstance(self.system, SwitchedSystem):
+            return super().sides_changed(number)
+        return (*self.system.sides_changed(number - 1), (number - 1,))
+
+    @property
+    def one_way(self) -> int:
+        """Return the number of transitions between modes of the system."""
+        return self.system.one_way if isinstance(self.system, SwitchedSystem) else 0
 
     @property
     def hysteresis(self) -> Any:

@@ -32,6 +32,7 @@ from ._restitution import (
 )
 from ._rocking_block import RockingBlock as RockingBlock
 from ._spinning_ball import SpinningBall as SpinningBall
+from ._spring_mass_runner import SpringMassRunner as SpringMassRunner
 from ._through_joints import simulate_through_joints as simulate_through_joints
 from ._triple_integrator import TripleIntegrator as TripleIntegrator
 from ._two_sided_stop import TwoSidedStop as TwoSidedStop

@@ -7,7 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from jaxcam.hybrid import HybridSystem, Settings, simulate, SwitchedSystem
+from jaxcam.hybrid import (
+    HybridSystem,
+    Settings,
+    simulate,
+    SwitchedSystem,
+    Trajectory,
+)
 from jaxcam.hybrid.checks import refuse_tracers
 from jaxcam.hybrid.record import Contacts, impact_table, Impacts, Printed, Switches
 from jaxcam.hybrid.sizes import component_sizes
@@ -172,6 +178,7 @@ def orbit_of(
             t0 = _half_a_flight_on(knots, t0, period)
             miss = knots.miss
     _check_closure(miss, closure, period)
+    _check_mode(turn)
     if polished:
         impacts, state = _rebuilt(system, knots, sides, t0, period)
     elif start is not None:
@@ -236,6 +243,18 @@ def _knots(system, impacts: Impacts, start: ImpactStart | None, t0, period, scal
         sides = np.append(start.constraint, sides[other])
     rows = np.concatenate([time[:, None], after], axis=1)
     return close(system, rows, sides, period, scale), sides
+
+
+def _check_mode(turn: Trajectory) -> None:
+    """Raise `ValueError` if a hybrid automaton returns to its state in another mode."""
+    if not (isinstance(turn.system, SwitchedSystem) and turn.system.one_way):
+        return
+    first, *_, last = turn.modes.names() * 2
+    if first != last:
+        raise ValueError(
+            f"after the period, the motion is in mode {last}, but it started in "
+            f"{first}; give another period, or start in another mode (`start_mode`)"
+        )
 
 
 def _half_a_flight_on(knots: Knots, t0, period) -> float:

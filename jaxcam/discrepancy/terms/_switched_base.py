@@ -50,6 +50,9 @@ class SwitchedWithHidden(WithHidden, SwitchedWrapping):
     def switching(self, t, state):
         return self.base.switching(t, self._own(state))
 
+    def distances(self, t, state, sides) -> jax.Array:
+        return self.base.distances(t, self._own(state), sides)
+
     def branch(self, t, state, sides) -> jax.Array:
         return self._driven(state, self.base.branch(t, self._own(state), sides))
 

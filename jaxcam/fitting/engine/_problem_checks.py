@@ -43,10 +43,17 @@ def _rates(layout: Layout, point: Point, pieces: Pieces):
 
 
 def refuse_hysteresis(model: Model) -> None:
-    """Raise `ValueError` for a system with hysteresis: its side of a surface at the
-    start of a piece is unknown.
+    """Raise `ValueError` for a system with hysteresis or modes: its side of a surface,
+    or its mode, at the start of a piece is unknown.
     """
     system = model.system
+    if isinstance(system, SwitchedSystem) and system.one_way:
+        raise ValueError(
+            f"{type(system).__name__} is a hybrid automaton: a piece of a recording "
+            "does not show in which mode it begins. Fit such a system by simulations "
+            "with `jaxcam.simulate`, or state it as a `SwitchedSystem` whose sides "
+            "depend on the state alone."
+        )
     if isinstance(system, SwitchedSystem) and np.any(np.asarray(system.hysteresis) > 0):
         raise ValueError(
             f"{type(system).__name__} has switching surfaces with hysteresis: between "

@@ -109,25 +109,24 @@ def sides_after(
     negative, sliding = list(carried.negative), list(carried.sliding)
     across = hit[functions.m :]
     if not functions.slidable:
-        flags = [a ^ b for a, b in zip(negative, across, strict=True)]
-        return Sides(tuple(flags), tuple(sliding), [], [])
+        negative = functions.turned(negative, across)
+        return Sides(tuple(negative), tuple(sliding), [], [])
     shares = functions.shares(t, made.raw, carried.mode)
     across = _leaving_together(functions, carried, shares, across)
     heights, blur = functions.heights(t, x, carried.extents, carried.mode)
     leaves = [jnp.asarray(False) for _ in negative]
-    on = list(leaves)
-    for k, crossed in enumerate(across):
-        if k not in functions.slidable:
-            negative[k] = negative[k] ^ crossed
-            continue
-        slid = sliding[k]
+    on, thrown, turns = list(leaves), list(leaves), list(across)
+    for k in functions.slidable:
+        crossed, slid = across[k], sliding[k]
         leaves[k] = crossed & slid
-        turns = jnp.where(slid, shares[k] > 0.5, True)
+        turns[k] = crossed & jnp.where(slid, shares[k] > 0.5, True)
         near = _NEAR * _size(carried, k) + 500 * blur[k]
         on[k] = jnp.abs(heights[k]) <= near
-        thrown = lands & ~crossed & slid & ~on[k]
-        negative[k] = jnp.where(thrown, heights[k] < 0, negative[k] ^ (crossed & turns))
-        sliding[k] = slid & ~leaves[k] & ~thrown
+        thrown[k] = lands & ~crossed & slid & ~on[k]
+        sliding[k] = slid & ~leaves[k] & ~thrown[k]
+    negative = functions.turned(negative, turns)
+    for k in functions.slidable:
+        negative[k] = jnp.where(thrown[k], heights[k] < 0, negative[k])
     return Sides(tuple(negative), tuple(sliding), leaves, on)
 
 
@@ -169,7 +168,14 @@ def past_surfaces(
     slides, stuck = [], jnp.asarray(False)
     passed_over, over = stuck, carried.passed_over
     slack = functions.slack(carried.mode) if functions.slidable else ()
-    for k in range(functions.k):
+    passes = any_of(hit[m : m + functions.one_way])
+    for k in range(functions.one_way):
+        # a guard that is zero at the beginning of its mode
+        gap = jets[m + k].gap
+        zero = passes & (jnp.abs(gap) <= _near(carried, k))
+        jets[m + k] = jets[m + k]._replace(gap=jnp.where(zero, 0.0, gap))
+        slides.append(jnp.asarray(False))
+    for k in range(functions.one_way, functions.k):
         jet, behind = jets[m + k], carried.behind[k]
         left = sides.leaves[k] if sides.leaves else jnp.asarray(False)
         crossed = hit[m + k] & ~left

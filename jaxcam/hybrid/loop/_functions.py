@@ -54,6 +54,9 @@ class Functions:
         self._branches = branches
         # surfaces on which a motion can slide
         self.slidable = found.slidable
+        # the number of transitions between modes, which are the first surfaces
+        self.one_way = found.one_way
+        self._changed = found.changed
         # whether contacts have friction; whether impacts may coincide
         self.rubs, self.joins = found.rubs, found.joins
         # direction in which crossings of a Poincaré section, the last surface, count
@@ -174,6 +177,14 @@ class Functions:
     def sides(self, t, x) -> tuple:
         """Return for each surface whether a start is on its negative side."""
         return tuple(self._call("sides", t, _pack(x))) if self.k else ()
+
+    def turned(self, negative, crossed) -> list:
+        """Return the flags of the negative sides after the crossings of surfaces."""
+        flags = list(negative)
+        for k, now in enumerate(crossed):
+            for other in self._changed[k]:
+                flags[other] = flags[other] ^ now
+        return flags
 
     def settled(self, t, x, mode):
         """Return the state moved onto the surfaces on which the motion slides; and, for

@@ -23,7 +23,7 @@ def jumping_components(
     If the switching function of a surface depends on none of these components, none is
     returned for this surface: the motion crosses the surface at the same speed on both
     sides and cannot slide along it. An example is a stop at a position, which changes a
-    force.
+    force. A motion also never slides at a transition between modes.
 
     Args:
         system: The system; only its structure matters.
@@ -58,7 +58,8 @@ def jumping_components(
     def changed(sets):
         found = [[i for i in range(n) if k in sets[i]] for k in range(number)]
         return tuple(
-            tuple(own) if set(own) & by_state[k] else () for k, own in enumerate(found)
+            tuple(own) if k >= system.one_way and set(own) & by_state[k] else ()
+            for k, own in enumerate(found)
         )
 
     return Jumps(changed(by_side), changed(free))

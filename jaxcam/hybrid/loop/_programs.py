@@ -81,8 +81,12 @@ class Programs:
         self.m, self.k = m, k = number(gaps), number(surfaces)
         self.planar = n == 2 and m == 1 and k == 0
         self._jumps = Jumps()
+        # the number of transitions between modes, which are the first surfaces; and for
+        # each surface, those whose sides change at its crossing
+        self.one_way, self.changed = 0, ()
         if isinstance(static, SwitchedSystem):
             self._jumps = jumping_components(static, shapes, time, state, k)
+            self.one_way, self.changed = static.one_way, static.sides_changed(k)
         self.slidable = [i for i, changed in enumerate(self._jumps.held) if changed]
         self.rubs = m > 0 and has_friction(static)
         self.joins = may_hit_together(static, n, m)

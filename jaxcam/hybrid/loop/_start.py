@@ -57,7 +57,12 @@ def first_sides(functions: Functions, t, x, contact):
         jet = jet._replace(gap=jnp.where(on, 0.0, jet.gap))
         return jet, on, on & moves_in(jet, rounding)
 
-    for k, flag in enumerate(sides):
+    for k in range(functions.one_way):
+        crossed = [jnp.asarray(False)] * functions.k
+        crossed[k] = jet_of(k, sides[k])[2]
+        sides[:] = functions.turned(sides, crossed)
+    for k in range(functions.one_way, functions.k):
+        flag = sides[k]
         own, _, leaves = jet_of(k, flag)
         other, on, back = jet_of(k, ~flag)
         touched[k] = on

@@ -9,5 +9,6 @@ from ._events import (
     Switches as Switches,
     SwitchKind as SwitchKind,
 )
+from ._modes import automaton as automaton, Modes as Modes
 from ._printed import Printed as Printed, vector_text as vector_text
 from ._trajectory import Trajectory as Trajectory

@@ -61,7 +61,7 @@ def assemble(
     kept = kept[:, :m] if k else kept
     steps = Steps(time, first(state, log.after, xp.nan), kept, count + 1, sides)
     of_events, of_contacts = (None, None) if sizes is None else sizes
-    switches = _switches(xp, log, m, of_events) if k else None
+    switches = _switches(xp, log, m, of_events, system.one_way) if k else None
     if not m:
         return Parts(*_nothing(xp, state, log), steps, switches)
     impacts = _impacts(xp, system, log, of_events, compiles)
@@ -92,8 +92,12 @@ def _nothing(xp: ModuleType, state, log: Log) -> tuple[Impacts, Contacts]:
     return impacts, Contacts(none, none, none > 0, which, count)
 
 
-def _switches(xp: ModuleType, log: Log, m: int, size: int | None) -> Switches:
-    """Return the events at switching surfaces, which the log numbers from `m` on."""
+def _switches(
+    xp: ModuleType, log: Log, m: int, size: int | None, one_way: int
+) -> Switches:
+    """Return the events at switching surfaces, which the log numbers from `m` on; the
+    first ones are `one_way` transitions, whose guards fall.
+    """
     crossed = rows_of_kind(log, RowKind.SWITCH, RowKind.SLIDE, RowKind.LEAVE)
     number = xp.sum(crossed)
     size = int(number) if size is None else size
@@ -101,12 +105,13 @@ def _switches(xp: ModuleType, log: Log, m: int, size: int | None) -> Switches:
     real = xp.arange(size) < number
     which = xp.where(real, log.constraint[index] - m, 0.0).astype(xp.int32)
     negative = xp.take_along_axis(log.mode[index], m + which[:, None], axis=1)[:, 0]
+    falls = (negative > 0.5) | (which < one_way)
     return Switches(
         xp.where(real, log.t[index], xp.inf),
         xp.where(real[:, None], log.before[index], xp.nan),
         xp.where(real[:, None], log.after[index], xp.nan),
         which,
-        xp.where(real, xp.where(negative > 0.5, -1.0, 1.0), xp.nan),
+        xp.where(real, xp.where(falls, -1.0, 1.0), xp.nan),
         number,
         xp.where(real, log.kind[index] - float(RowKind.SWITCH), 0.0).astype(xp.int32),
     )

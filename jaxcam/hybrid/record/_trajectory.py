@@ -13,6 +13,7 @@ from ..codes import message
 from ..programs import is_traced, is_tracing, program
 from ..surface import gaps
 from ._events import Contacts, Impacts, Steps, Switches
+from ._modes import Modes, modes_of
 from ._printed import Printed
 from ._sample import pad, sample, sample_known
 from ._section import crossings
@@ -178,6 +179,24 @@ class Trajectory(Printed):
         earlier = np.append(False, slides[:-1])
         found = np.stack([time[slides & ~earlier], time[~slides & earlier]], axis=1)
         return jnp.asarray(found[found[:, 1] > found[:, 0]])
+
+    @property
+    def modes(self) -> Modes:
+        """Return the intervals that the motion of a hybrid automaton spends in its
+        modes.
+
+        Raises:
+            ValueError: The system has no modes.
+
+        Examples:
+            >>> from jaxcam.models import SpringMassRunner
+            >>> start = [0.0, 1.0, 5.0, 0.0]
+            >>> run = jaxcam.simulate(SpringMassRunner(), start, 0.0, 0.4)
+            >>> run.modes.names()
+            ['falling', 'stance', 'rising', 'falling']
+        """
+        refuse_tracers("modes", "trajectory.steps.sides", self)
+        return modes_of(self.system, self.steps)
 
     def stroboscopic(self, period=None, phase=0.0) -> Float[Array, "k n"]:
         """Return the states at the times `t0 + phase + i * period`, i = 0, 1, ...

@@ -247,7 +247,7 @@ def open_distances(mode: OnSides, t, x) -> Float[Array, " k"]:
     """Return the distance of a motion that does not slide from each surface, shape
     `(k,)`.
     """
-    return mode.signs * surfaces(mode.system, t, x) + mode.system.hysteresis
+    return mode.system.distances(t, x, mode.signs)
 
 
 def switching_distances(mode: InMode, t, x) -> Float[Array, " k"]:
