@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +12,8 @@ from jaxcam import simulate
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.report._curves import errors_of, graded, level_of
 from jaxcam.discrepancy.report._missing import _words
-from jaxcam.discrepancy.search import occam, roughness
+from jaxcam.discrepancy.search import _free_fits, occam, roughness
+from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
 from jaxcam.discrepancy.terms import (
     Factor,
     families,
@@ -271,3 +273,40 @@ def test_an_undetermined_straight_line_has_no_part_in_the_error():
     timed = dataclasses.replace(family, argument=Variable.TIME)
     slope = level_of(timed, along, basis)[:, 1]
     np.testing.assert_allclose(slope, along, atol=1e-12)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_a_fit_that_fails_with_a_new_smoothness_does_not_replace_the_one_before(
+    monkeypatch,
+):
+    """The second fit remains above the cost that it should fall below: the functions
+    and the cost are those of the first.
+    """
+    problem = SimpleNamespace(samples=100)
+    late = POLICY.late_attempts
+
+    def planned(cost, iterations):
+        return SimpleNamespace(
+            cost=cost, iterations=iterations, point=None, problem=problem
+        )
+
+    fits = iter([planned(100.0, 3), planned(140.0, late)])
+    monkeypatch.setattr(_free_fits, "fit", lambda *_, **__: next(fits))
+    for name in ("filled", "heated"):
+        monkeypatch.setattr(_free_fits, name, lambda given, _: given)
+    monkeypatch.setattr(_free_fits, "_recentred", lambda *given: given[-1])
+    monkeypatch.setattr(_free_fits, "_alike", lambda *_: False)
+
+    class Planned(FreeFits):
+        def free(self, found):
+            return []
+
+        def _rougher(self, subset, functions, point, heat):
+            return ("rougher",)
+
+        def score(self, subset, found):
+            return found.cost + 5.0
+
+    subset = Subset(problem, ("first",), frozenset())  # pyright: ignore
+    found = Planned((), (), POLICY).fitted(subset, None, beaten=120.0)  # pyright: ignore
+    assert (found.functions, found.score) == (("first",), 105.0)

@@ -188,3 +188,24 @@ def test_an_input_behind_an_actuator_is_followed():
         drive = jax.tree.map(lambda one: jnp.asarray(one[0, k]), pieces.drive)
         end, _ = fly(model, jnp.asarray(exact[first]), start, h, drive, 4)
         assert abs(float(end[0]) - exact[last, 0]) < 0.035 * noise
+
+
+class RubbedCart(Cart):
+    """The same mass with smoothed dry friction."""
+
+    steep = True
+
+
+@pytest.mark.parametrize(("cart", "short"), [(Cart(), False), (RubbedCart(), True)])
+def test_steps_with_steep_forces_are_as_short_as_the_samples(cart, short):
+    """With a smooth input, other forces need only steps of several samples."""
+    time = _INTERVAL * np.arange(_COUNT)
+    force = np.sin(5 * time)
+    place = -_GAIN * (np.sin(5 * time) / 25 - time / 5)
+    run = Recording("run", time, {"position_m": place, "force_N": force})
+    sensors = {"position_m": Sensor(0, noise=1e-5)}
+    model = Model(cart, sensors, Input("force_N", _force, "linear"))
+    part = segment(run, "position_m", None, noise=1e-5)
+    pieces = Problem.build(model, [part], []).pieces
+    step = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    assert (step <= _INTERVAL * (1 + 1e-9)) == short

@@ -49,6 +49,10 @@ class HybridSystem(eqx.Module):
     """Whether impacts may add energy, as with a driven bumper or in reversed time.
     Otherwise, a coefficient of restitution above one is an error.
     """
+    steep: ClassVar[bool] = False
+    """Whether a force changes steeply with the state, as smoothed dry friction does. A
+    fit to recordings with a measured input then takes steps as short as their samples.
+    """
 
     @abc.abstractmethod
     def vector_field(

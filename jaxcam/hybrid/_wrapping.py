@@ -64,6 +64,11 @@ class Wrapping(HybridSystem):
         return self.inner.active
 
     @property
+    def steep(self) -> bool:  # pyright: ignore
+        """Return whether a force changes steeply with the state."""
+        return self.inner.steep
+
+    @property
     def period(self) -> Any:
         """Return the period of the forcing (s), or `None`."""
         return self.inner.period

@@ -93,7 +93,8 @@ class FreeFits:
         A fit that does not fall below the cost `beaten` soon enough is stopped.
         """
         policy, functions = self.policy, subset.functions
-        heat, point, found = 1.0, start, None
+        heat, point, found, failed = 1.0, start, None, False
+        earlier: tuple[Subset, Fit] | None = None
         # in each fit, the parameters of a hidden element can change by a limited step
         hidden = any(isinstance(one, Hidden) for one in functions)
         turns = policy.prior_fits + (policy.element_fits if hidden else 0)
@@ -111,8 +112,10 @@ class FreeFits:
             )
             point, before, heat = found.point, heat, heat_of(found)
             late = found.iterations >= policy.late_attempts // 2
-            if not math.isfinite(found.cost) or late and not found.cost < beaten:
+            failed = not math.isfinite(found.cost) or late and not found.cost < beaten
+            if failed:
                 break
+            earlier = subset._replace(functions=functions), found
             settled = max(heat, before) < policy.prior_settled * min(heat, before)
             if functions and not last:
                 fresh = self._rougher(subset, functions, point, heat)
@@ -123,9 +126,16 @@ class FreeFits:
             if settled:
                 break
         assert found is not None
-        subset = subset._replace(functions=functions)
+        fits = [(subset._replace(functions=functions), found)]
+        if failed and earlier is not None:
+            # with the smoothness that the fit before suggested, this one has failed
+            fits.append(earlier)
+        scored = [self._scored(*one) for one in fits]
+        return min(scored, key=lambda one: (not math.isfinite(one.score), one.score))
+
+    def _scored(self, subset: Subset, found: Fit) -> Missing:
         score = self.score(subset, found)
-        return Missing(functions, subset.names, found, score, subset.problem)
+        return Missing(subset.functions, subset.names, found, score, subset.problem)
 
     def polished(self, found: Missing) -> Missing:
         """Return a fit at the optimum of its parameters, for a report."""

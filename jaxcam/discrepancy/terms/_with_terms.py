@@ -38,6 +38,10 @@ class WithTerms(Wrapping):
         """Speed of the drive (rad/s), if the base has one."""
         return self.base.speed  # pyright: ignore
 
+    @property
+    def steep(self) -> bool:  # pyright: ignore
+        return self.inner.steep or any(term.corner for term in self.terms)
+
     def prepared(self) -> "WithTerms":
         new = self.base.prepared(), prepared_terms(self.terms)
         return eqx.tree_at(lambda s: (s.base, s.terms), self, new)

@@ -206,9 +206,12 @@ class Problem:
             refuse_not_finite(layout, segments, pieces, point)
             if steps >= _MOST_STEPS:
                 break
+            finest = min(steps_of_samples(segments, pieces, steps), _MOST_STEPS)
+            if measured is not None and model.system.steep and steps < finest:
+                steps = finest
+                continue
             if not followed_by_lines(layout, segments, pieces, point, _MOST_STEPS):
-                finest = steps_of_samples(segments, pieces, steps)
-                steps = min(2 * steps, finest, _MOST_STEPS)
+                steps = min(2 * steps, finest)
                 continue
             if followed_by_cubics(layout, pieces, point):
                 break

@@ -1,0 +1,155 @@
+"""Test whether named effects are recognised in user-defined rigs, alone and together
+with an effect without a name.
+
+The cases are made as those of `benchmarks.unnamed`, with an effect of the library
+instead, or in addition. A verdict is correct if it names this effect alone, with a
+strength within 15 % or two standard errors of the true one; and, with `--beside`, if it
+also models the unnamed force by the criteria of `benchmarks.unnamed`.
+
+    python -m benchmarks.named stage
+    python -m benchmarks.named two_stops --effects coulomb_friction --beside stop
+"""
+
+import argparse
+import math
+import time
+
+import numpy as np
+
+from benchmarks._hidden_physics import Effect, EFFECTS, Hidden, Scales
+from benchmarks._own_rig_makers import Accumulates, made_case, MAKERS
+from benchmarks._verdicts import close
+from benchmarks.own_rigs import drawn, RIGS
+from benchmarks.unnamed import function_off, scales_of
+from jaxcam.discrepancy import diagnose
+from jaxcam.fitting import read_setup
+
+
+_DURATION, _DRAWS = 6.0, 40
+
+
+def _direction(w):
+    return np.tanh(w / 1e-3)
+
+
+def _force(value, low: float, high: float) -> Effect:
+    return Effect("force", (), value, (low, high))
+
+
+# the effects as in `_hidden_physics.py`
+NAMED = {
+    "coulomb_friction": _force(lambda u, w, phi, t, s: -_direction(w), 0.01, 0.04),
+    "quadratic_drag": _force(lambda u, w, phi, t, s: -w * abs(w), 0.05, 0.2),
+    "nonlinear_spring": _force(lambda u, w, phi, t, s: -(u**3), 0.1, 0.3),
+    "restitution_velocity": Effect(
+        "restitution", (), lambda u, w, phi, t, s: -s, (0.1, 0.25)
+    ),
+}
+
+
+def strength_of(name: str, hidden: Hidden) -> float | None:
+    """The strength of an effect as the library defines it, or `None` if it also depends
+    on constants of the rig.
+    """
+    size = hidden.size * hidden.scales.acceleration
+    if name == "coulomb_friction":
+        return size
+    if name == "quadratic_drag":
+        return size / hidden.scales.velocity**2
+    return None
+
+
+def together(one: Hidden, other: Hidden) -> Hidden:
+    """Two forces as one."""
+
+    def value(*arguments):
+        first = one.size * one.effect.value(*arguments)
+        return first + other.size * other.effect.value(*arguments)
+
+    return Hidden(_force(value, 1.0, 1.0), 1.0, one.scales)
+
+
+def hidden_case(name: str, setup, effect: str, beside: str | None, seed: int):
+    """A named effect, an unnamed one or `None`, the recordings and the motions.
+
+    **Raises:** `ValueError` if impacts accumulate in many rigs.
+    """
+    rng = np.random.default_rng([seed, *effect.encode(), *(beside or "").encode()])
+    for _ in range(_DRAWS):
+        truth = drawn(setup, rng)
+        try:
+            bare = made_case(name, setup, truth, rng, None, _DURATION)
+            scales = scales_of(setup, [motion for _, motion in bare])
+            named = _sized(NAMED[effect], scales, rng)
+            other = None if beside is None else _sized(EFFECTS[beside], scales, rng)
+            both = named if other is None else together(named, other)
+            made = made_case(name, setup, truth, rng, both, _DURATION)
+        except Accumulates:
+            continue
+        runs, motions = map(list, zip(*made))
+        return named, other, runs, motions
+    raise ValueError(f"impacts accumulate in {_DRAWS} rigs of {name} with {effect}")
+
+
+def _sized(effect: Effect, scales: Scales, rng) -> Hidden:
+    return Hidden(effect, float(rng.uniform(*effect.size)), scales)
+
+
+def judged(found, effect: str, named: Hidden, other: Hidden | None, motions):
+    """Whether a verdict is correct, and what it says."""
+    names = [one.name for one in found.effects if one.name != "unknown"]
+    said = [found.verdict, *names]
+    true, strength = strength_of(effect, named), math.nan
+    right = names == [effect]
+    if right and true is not None:
+        (one,) = (one for one in found.effects if one.name == effect)
+        (fitted,) = one.parameters.values()
+        strength = fitted.value / true
+        right = close(true, fitted.value, fitted.stderr)
+    said.append(f"strength {strength:.3f} of the true one")
+    wanted = [] if other is None else [other]
+    right = right and len(found.missing) == len(wanted)
+    for hidden, one in zip(wanted, found.missing):
+        kind = one.kind, set(one.arguments)
+        alike = kind == (hidden.effect.kind, set(hidden.effect.arguments))
+        off = function_off(one, hidden, motions) if alike else math.inf
+        said.append(f"{one.kind} by {', '.join(one.arguments)} off by {off:.2f}")
+        right = right and off < 0.4
+    left = found.heldout_after / found.noise_floor
+    return right, f"{'; '.join(said)}; {left:.2f} noises left"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("rig", choices=sorted(MAKERS))
+    parser.add_argument("--effects", nargs="*", choices=sorted(NAMED))
+    forces = sorted(name for name, one in EFFECTS.items() if one.kind == "force")
+    parser.add_argument("--beside", choices=forces, help="a further, unnamed force")
+    parser.add_argument("--first", type=int, default=0, help="seed of first case")
+    parser.add_argument("--cases", type=int, default=1, help="cases per effect")
+    args = parser.parse_args()
+    setup = read_setup(RIGS / f"{args.rig}.toml")
+    count, correct = 0, 0
+    for name in args.effects or NAMED:
+        if NAMED[name].kind == "restitution":
+            if args.beside or not MAKERS[args.rig].impacts:
+                continue
+        for seed in range(args.first, args.first + args.cases):
+            named, other, runs, motions = hidden_case(
+                args.rig, setup, name, args.beside, seed
+            )
+            begun, spent = time.time(), time.process_time()
+            found = diagnose(setup, runs, case=f"{args.rig} {name} {seed}")
+            good, why = judged(found, name, named, other, motions)
+            count, correct = count + 1, correct + good
+            print(
+                f"{name}{f' and {args.beside}' if args.beside else ''} {seed}: "
+                f"{'right' if good else 'WRONG'}: {why} [{time.time() - begun:.0f} s, "
+                f"{time.process_time() - spent:.0f} s of CPU]\n    {found.summary}",
+                flush=True,
+            )
+    print(f"{args.rig}: {correct} of {count} right")
+
+
+if __name__ == "__main__":
+    main()
