@@ -80,6 +80,9 @@ def hidden_case(name: str, setup, effect: str, beside: str | None, seed: int):
         try:
             bare = made_case(name, setup, truth, rng, None, _DURATION)
             scales = scales_of(setup, [motion for _, motion in bare])
+            if effect == "nonlinear_spring":
+                centre = float(setup.references.get("force_centre", 0.0))
+                scales = scales._replace(middle=centre)
             named = _sized(NAMED[effect], scales, rng)
             other = None if beside is None else _sized(EFFECTS[beside], scales, rng)
             both = named if other is None else together(named, other)

@@ -11,7 +11,7 @@ from test_discrepancy_coordinates import Pair, PAIRS, Push, Softer
 
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
-from jaxcam.discrepancy._elsewhere import sought_elsewhere
+from jaxcam.discrepancy._elsewhere import falls_short, sought_elsewhere
 from jaxcam.discrepancy.report import Diagnosis
 from jaxcam.discrepancy.search import _slots
 from jaxcam.discrepancy.search._roughness import Roughness
@@ -154,6 +154,11 @@ class _Found:
     location: tuple[str, str] | None = None
     differing: None = None
     noise_floor: float = 1e-4
+    bare: float = 1e6
+
+    @property
+    def before(self):
+        return SimpleNamespace(cost=self.bare)
 
     @property
     def after(self):
@@ -186,6 +191,16 @@ def test_the_location_that_explains_clearly_more_is_chosen(
     assert found.location == chosen
     assert len(tried) == asked
     assert ("This effect acts at" in found.summary) == (chosen is not None)
+
+
+def test_a_named_effect_that_explains_nearly_everything_does_not_fall_short(
+    unchecked_types,
+):
+    """What is left, 4000 of 1e6, may be an error of the form of the named term."""
+    named = _Found(5000.0, Verdict.EFFECT)
+    assert not falls_short(named)  # pyright: ignore
+    assert falls_short(dataclasses.replace(named, bare=1e5))  # pyright: ignore
+    assert falls_short(_Found(5000.0))  # pyright: ignore
 
 
 def test_terms_of_ones_own_are_not_moved_to_other_gaps(unchecked_types):

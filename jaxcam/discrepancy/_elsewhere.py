@@ -13,8 +13,15 @@ def falls_short(found: Diagnosis) -> bool:
     separate = found.differing
     if found.verdict is Verdict.NONE or (separate is not None and separate.complete):
         return False
-    samples = found.after.problem.samples
-    return above_noise(found.after.cost, samples, found.policy)
+    samples, left = found.after.problem.samples, found.after.cost
+    explained = found.before.cost - left
+    if (
+        found.verdict is Verdict.EFFECT
+        and left - samples < found.policy.small * explained
+    ):
+        # an error of the form of the named terms may leave as much
+        return False
+    return above_noise(left, samples, found.policy)
 
 
 def _left(found: Diagnosis) -> float:
