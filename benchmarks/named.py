@@ -26,6 +26,8 @@ from jaxcam.fitting import read_setup
 
 
 _DURATION, _DRAWS = 6.0, 40
+# reference speed of restitution in the library
+_IMPACT_SPEED = 0.3
 
 
 def _direction(w):
@@ -41,21 +43,22 @@ NAMED = {
     "coulomb_friction": _force(lambda u, w, phi, t, s: -_direction(w), 0.01, 0.04),
     "quadratic_drag": _force(lambda u, w, phi, t, s: -w * abs(w), 0.05, 0.2),
     "nonlinear_spring": _force(lambda u, w, phi, t, s: -(u**3), 0.1, 0.3),
+    # `s` in units of the reference speed
     "restitution_velocity": Effect(
-        "restitution", (), lambda u, w, phi, t, s: -s, (0.1, 0.25)
+        "restitution", (), lambda u, w, phi, t, s: -np.log1p(s), (0.03, 0.1)
     ),
 }
 
 
 def strength_of(name: str, hidden: Hidden) -> float | None:
-    """The strength of an effect as the library defines it, or `None` if it also depends
-    on constants of the rig.
-    """
+    """The strength of an effect as the library defines it, or `None` for a spring."""
     size = hidden.size * hidden.scales.acceleration
     if name == "coulomb_friction":
         return size
     if name == "quadratic_drag":
         return size / hidden.scales.velocity**2
+    if name == "restitution_velocity":
+        return hidden.size
     return None
 
 
@@ -81,8 +84,10 @@ def hidden_case(name: str, setup, effect: str, beside: str | None, seed: int):
             bare = made_case(name, setup, truth, rng, None, _DURATION)
             scales = scales_of(setup, [motion for _, motion in bare])
             if effect == "nonlinear_spring":
-                centre = float(setup.references.get("force_centre", 0.0))
+                centre = float(setup.references.get("spring_center", 0.0))
                 scales = scales._replace(middle=centre)
+            if effect == "restitution_velocity":
+                scales = scales._replace(velocity=_IMPACT_SPEED)
             named = _sized(NAMED[effect], scales, rng)
             other = None if beside is None else _sized(EFFECTS[beside], scales, rng)
             both = named if other is None else together(named, other)

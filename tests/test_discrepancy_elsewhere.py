@@ -155,6 +155,8 @@ class _Found:
     differing: None = None
     noise_floor: float = 1e-4
     bare: float = 1e6
+    missing: tuple = ()
+    names: tuple = ()
 
     @property
     def before(self):
@@ -201,6 +203,18 @@ def test_a_named_effect_that_explains_nearly_everything_does_not_fall_short(
     assert not falls_short(named)  # pyright: ignore
     assert falls_short(dataclasses.replace(named, bare=1e5))  # pyright: ignore
     assert falls_short(_Found(5000.0))  # pyright: ignore
+
+
+def test_a_function_at_the_first_gap_is_not_said_to_act_at_another(unchecked_types):
+    """It was found by the search at the second gap, which offers functions at both."""
+    law = (SimpleNamespace(gap="constraint 0"),)
+
+    def ask(location):
+        return _Found(1000.0 if location == Location(0, 1) else 5000.0, missing=law)
+
+    found = sought_elsewhere(_Found(5000.0), ask)  # pyright: ignore
+    assert (found.cost, found.location) == (1000.0, None)
+    assert "acts at" not in found.summary
 
 
 def test_terms_of_ones_own_are_not_moved_to_other_gaps(unchecked_types):
