@@ -156,7 +156,7 @@ class _Found:
     noise_floor: float = 1e-4
     bare: float = 1e6
     missing: tuple = ()
-    names: tuple = ()
+    effects: tuple = ()
 
     @property
     def before(self):
@@ -210,7 +210,8 @@ def test_a_function_at_the_first_gap_is_not_said_to_act_at_another(unchecked_typ
     law = (SimpleNamespace(gap="constraint 0"),)
 
     def ask(location):
-        return _Found(1000.0 if location == Location(0, 1) else 5000.0, missing=law)
+        cost = 1000.0 if location == Location(0, 1) else 5000.0
+        return _Found(cost, missing=law, effects=(SimpleNamespace(term=False),))
 
     found = sought_elsewhere(_Found(5000.0), ask)  # pyright: ignore
     assert (found.cost, found.location) == (1000.0, None)

@@ -56,7 +56,8 @@ def sought_elsewhere(
         return found
     first, then = (one.said(system, system.coordinates) for one in (Location(), where))
     gaps = {one.gap for one in best.missing}
-    if not best.names and not where.coordinate and gaps == {first[1]}:
+    named = any(one.term for one in best.effects)
+    if not named and not where.coordinate and gaps == {first[1]}:
         # functions at impacts are sought at several gaps, whatever the location
         return best
     kind, k = ("coordinate", 0) if where.coordinate else ("gap", 1)
