@@ -271,3 +271,40 @@ def test_the_impacts_of_complete_chatter_are_one_event():
     assert float(run.impacts) > 3.0
     early = flow(ball, jnp.array([1.0, 0.0]), 0.0, 1.0)
     assert (float(early.events.impacts), float(early.events.contacts)) == (2.0, 0.0)
+
+
+class TwoThresholds(SwitchedSystem):
+    """A forced linear oscillator that crosses thresholds of position and velocity."""
+
+    amplitude: float = 1.0
+    omega: float = 0.8
+    damping: float = 0.1
+
+    def switching(self, t, state):
+        return jnp.stack([state[0] - 0.5, state[1] - 0.6])
+
+    def branch(self, t, state, sides):
+        force = self.amplitude * jnp.cos(self.omega * t)
+        return jnp.stack([state[1], force - state[0] - 2 * self.damping * state[1]])
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / self.omega
+
+
+def test_an_orbit_through_the_corner_of_two_surfaces_is_located():
+    """Position 0.5 and velocity 0.6 are reached at the same time if the amplitude of
+    the response is hypot(0.5, 0.6 / omega); to 1e-8.
+    """
+    system = TwoThresholds()
+    orbit = continuation.periodic_orbit(system)
+    found = continuation.branch(system, orbit, "amplitude", (0.2, 1.1), direction=-1)
+    omega = 0.8
+    gain = np.hypot(1 - omega**2, 2 * 0.1 * omega)
+    expected = gain * np.hypot(0.5, 0.6 / omega)
+    corners = [p for p in found.special if p.kind == "corner collision"]
+    assert [p.kind for p in found.special].count("change of events") == 0
+    np.testing.assert_allclose([p.parameter for p in corners], [expected], atol=1e-8)
+    # at a smaller amplitude, the threshold of the velocity is not reached
+    others = [p.parameter for p in found.special if p.kind == "grazing"]
+    np.testing.assert_allclose(others, [gain * 0.6 / omega], atol=1e-8)

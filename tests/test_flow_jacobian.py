@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxcam.hybrid import flow, Settings
-from jaxcam.hybrid._event_counts import EventCounts
+from jaxcam.hybrid._event_counts import EventCounts, EventOrder
 from jaxcam.hybrid.codes import RESULTS, RowKind
 from jaxcam.hybrid.flow_jacobian import flow_jacobian
 from jaxcam.models import BeltOscillator, ImpactOscillator, TwoSidedStop
@@ -89,12 +89,31 @@ def test_events_are_counted_as_one_by_one():
     """The counts of 200 random sequences of 40 attempts are exact."""
     rng = np.random.default_rng(0)
     for kinds in rng.integers(0, len(RowKind), (200, 40)):
-        counts = np.zeros(5)
-        for kind in kinds:
+        counts, events = np.zeros(5), []
+        places = rng.integers(0, 3, len(kinds))
+        for kind, place in zip(kinds, places, strict=True):
+            if kind == RowKind.LAST_IMPACT:
+                events = events[: len(events) - int(counts[-1])]
+            if kind not in (RowKind.NOTHING, RowKind.STEP, RowKind.STOP):
+                events.append(place)
             counts = _after(counts, kind)
-        made = EventCounts.of(kinds.astype(float))
+        made = EventCounts.of(kinds.astype(float), places.astype(float))
         found = made.impacts, made.contacts, made.crossings, made.slides, made.recent
         np.testing.assert_array_equal(np.array(found), counts)
+        exchanges = sum(a > b for i, b in enumerate(events) for a in events[:i])
+        assert float(made.order) == (-1.0) ** exchanges
+
+
+def test_the_order_of_events_is_found_one_by_one():
+    """As from the complete sequence, also with completed chatter sequences."""
+    rng = np.random.default_rng(1)
+    for kinds in rng.integers(0, len(RowKind), (10, 25)):
+        places = rng.integers(0, 3, len(kinds)).astype(float)
+        order = EventOrder.zero(3)
+        for kind, place in zip(kinds.astype(float), places, strict=True):
+            order = order.after(jnp.asarray(kind), jnp.asarray(place))
+        made = EventCounts.of(kinds.astype(float), places)
+        assert float(order.sign) == float(made.order)
 
 
 def _after(counts, kind):

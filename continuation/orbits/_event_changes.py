@@ -23,6 +23,7 @@ _SYMMETRIC = 1e-4
 
 _MODE = ("contacts", "sides", "sliding")
 _COUNTED = ("impacts", "contacts", "crossings", "slides")
+_ORDER = "order of events"
 
 
 def monitors_of_events() -> dict[str, Monitor]:
@@ -30,10 +31,10 @@ def monitors_of_events() -> dict[str, Monitor]:
 
     Of the two, the first changes sign if one event is added or removed, the second if
     two are. The mode at the start of the period changes where an event passes through
-    the start.
+    the start, and the order of events where two of them occur at the same time.
     """
     names = [name for one in _COUNTED for name in (one, f"pairs of {one}")]
-    names += [f"{part} at the start" for part in _MODE]
+    names += [f"{part} at the start" for part in _MODE] + [_ORDER]
     return {name: Monitor(CHANGE, bracket=True, corner=True) for name in names}
 
 
@@ -48,6 +49,7 @@ def values_of_events(arrival: Any) -> dict[str, Float[Array, ""]]:
         number = getattr(arrival.events, name)
         found[name] = 1.0 - 2.0 * jnp.mod(number, 2.0)
         found[f"pairs of {name}"] = 1.0 - 2.0 * jnp.mod(jnp.floor(number / 2), 2.0)
+    found[_ORDER] = arrival.events.order
     return found
 
 
@@ -116,6 +118,8 @@ def name_of_change(
     - `"crossing-sliding"`: a crossing of a surface becomes sliding along it.
     - `"switching-sliding"`: it crosses a surface before it slides there.
     - `"adding-sliding"`: it leaves the surface for a moment during sliding.
+    - `"corner collision"`: two events at different constraints or surfaces exchange
+      their order; the orbit passes through the intersection of both.
 
     (M. di Bernardo, P. Kowalczyk, A. Nordmark, Bifurcations of dynamical systems with
     sliding, Physica D 170 (2002))
@@ -136,6 +140,8 @@ def name_of_change(
         return "switching-sliding"
     if change == {"slide": 1, "leave": 1, "cross": -1}:
         return "crossing-sliding"
+    if not change and _exchanged(first, second):
+        return "corner collision"
     if change == {"slide": 1, "leave": 1}:
         return "grazing-sliding" if _briefest(after) == "slide" else "adding-sliding"
     return CHANGE
@@ -147,6 +153,27 @@ def _rotated(first: list[Event], second: list[Event]) -> bool:
         return False
     turns = range(max(1, len(first)))
     return any(first[k:] + first[:k] == second for k in turns)
+
+
+def _exchanged(first: list[Event], second: list[Event]) -> bool:
+    """Return whether two periodic sequences differ by the order of two consecutive
+    events at different constraints or surfaces.
+    """
+    number = len(first)
+    for k in range(number):
+        other, after = first[k], first[(k + 1) % number]
+        if _place(other) == _place(after):
+            continue
+        swapped = list(first)
+        swapped[k], swapped[(k + 1) % number] = after, other
+        if _rotated(swapped, second):
+            return True
+    return False
+
+
+def _place(event: Event) -> tuple[bool, int]:
+    """Return where an event occurs: at a surface or at a constraint, and which."""
+    return event.kind in ("cross", "slide", "leave"), event.constraint
 
 
 def _briefest(events: list[tuple[float, Event]]) -> str:

@@ -1,5 +1,6 @@
 """Compute the flow map: the final state, without a record of the events."""
 
+import dataclasses
 import functools
 
 import equinox as eqx
@@ -11,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..parameters import as_arrays, real_array, VectorLike
 from ._compiled_run import run_compiled
-from ._event_counts import EventCounts
+from ._event_counts import EventCounts, EventOrder
 from ._prepared import prepared
 from ._settings import Settings
 from ._system import HybridSystem
@@ -121,7 +122,8 @@ def unchecked_flow(
 def _by_llvm(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     case = prepared(system), settings, t0, state, t1
     made = run_compiled(case, max_steps)
-    return arrival_of(made.end, np.asarray(made.log.kind), made.mode)
+    kinds, places = np.asarray(made.log.kind), np.asarray(made.log.constraint)
+    return arrival_of(made.end, kinds, places, made.mode)
 
 
 def _traced(system, settings, state, t0, t1, max_steps: int) -> Arrival:
@@ -133,11 +135,11 @@ def _traced(system, settings, state, t0, t1, max_steps: int) -> Arrival:
 _by_xla = program(_traced)
 
 
-def arrival_of(end: LoopState, kinds, mode) -> Arrival:
+def arrival_of(end: LoopState, kinds, places, mode) -> Arrival:
     """Return the `Arrival` of a run that is not traced.
 
-    **Arguments:** the loop state at its end, the kinds of its attempted steps, and the
-    mode at its start.
+    **Arguments:** the loop state at its end, the kinds of its attempted steps, their
+    constraints or surfaces, and the mode at its start.
     """
     return Arrival(
         state=jnp.asarray(end.x),
@@ -145,7 +147,7 @@ def arrival_of(end: LoopState, kinds, mode) -> Arrival:
         impacts=jnp.asarray(end.impacts),
         steps=jnp.asarray(end.steps),
         code=jnp.asarray(int(end.status), dtype=jnp.int32),
-        events=EventCounts.of(kinds),
+        events=EventCounts.of(kinds, places),
         start=jnp.asarray(mode),
     )
 
@@ -160,16 +162,20 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     start = jnp.stack(carried.mode) if carried.mode else jnp.zeros(0, bool)
 
     def attempt(both):
-        carried, events = both
+        carried, events, order = both
         carried, record = iteration(functions, plan, carried)
-        kind = jax.lax.stop_gradient(jnp.asarray(record.kind, jnp.float64))
-        return (carried, events.after(kind)), jnp.zeros(())
+        kind, place = (
+            jax.lax.stop_gradient(jnp.asarray(one, jnp.float64))
+            for one in (record.kind, record.constraint)
+        )
+        after = carried, events.after(kind), order.after(kind, place)
+        return after, jnp.zeros(())
 
-    first = carried, EventCounts.zero()
+    first = carried, EventCounts.zero(), EventOrder.zero(functions.m + functions.k)
     body, kept = with_kept(attempt, first, on=not settings.plain)
 
     def unfinished(carry):
-        count, ((carried, _), _) = carry
+        count, ((carried, *_), _) = carry
         return (count < max_steps) & eqxi.unvmap_any(carried.status == RUNNING)
 
     def several(carry):
@@ -179,13 +185,13 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
 
     begin = (jnp.asarray(0, jnp.int32), (first, kept))
     loop = functools.partial(jax.lax.while_loop, unfinished, several)
-    _, ((carried, events), kept) = one_kernel(loop, on=not settings.plain)(begin)
+    _, ((carried, events, order), kept) = one_kernel(loop, on=not settings.plain)(begin)
     return Arrival(
         state=jnp.stack(carried.x),
         contact=jnp.stack(carried.contact) if functions.m else jnp.zeros(0, bool),
         impacts=carried.impacts,
         steps=depend_on(carried.steps, kept),
         code=carried.status.astype(jnp.int32),
-        events=events,
+        events=dataclasses.replace(events, order=order.sign),
         start=start,
     )

@@ -188,13 +188,13 @@ class _Loop(NamedTuple):
         _, nothing = laid_out(jax.tree.map(lambda _: None, arrays))
         numbers, lane = laid_out(begun.first)
         step = _Attempt(begun.shapes)
-        key = key_of(static, nothing, shared, begun.first, _row, 1, step)
+        key = key_of(static, nothing, shared, begun.first, _row, 2, step)
         place = jax.tree.unflatten(lane.structure, range(len(numbers)))
         return _Loop(attempts_of(key), shared.size, place)
 
 
 def _row(record, lane: JacobianState):
-    return lane.state.steps - 1.0, [record.kind]
+    return lane.state.steps - 1.0, [record.kind, record.constraint]
 
 
 def _begun(case) -> tuple[_Loop, np.ndarray, np.ndarray]:
@@ -240,9 +240,9 @@ def flow_jacobian(
     loop, shared, lane = _begun((setup, given, settings, jnp.asarray(y, jnp.float64)))
     place = loop.place
     mode = lane[0, list(place.state.mode)] > 0.5
-    table = np.zeros((1, max_steps, 1))
+    table = np.zeros((1, max_steps, 2))
     loop.attempts.run(shared, np.zeros((1, 0)), lane, table, limit=max_steps)
     end = jax.tree.map(lambda k: lane[0, k], place.state)
     columns = [lane[0, list(moving.x)] for moving in place.moving]
-    kinds = table[0, : int(end.steps), 0]
-    return arrival_of(end, kinds, mode), jnp.asarray(np.stack(columns, axis=1))
+    kinds, places = table[0, : int(end.steps)].T
+    return arrival_of(end, kinds, places, mode), jnp.asarray(np.stack(columns, axis=1))
