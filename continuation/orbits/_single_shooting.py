@@ -49,8 +49,8 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     crossings and sliding phases. The Jacobian contains the saltation matrices of all
     events. Points at which the sequence of events changes are located and named:
     `"grazing"`, `"grazing-sliding"`, `"crossing-sliding"`, `"switching-sliding"`,
-    `"adding-sliding"`, `"corner collision"` or `"change of events"`. If the sequence changes twice in one
-    step, the second change may be missed.
+    `"adding-sliding"`, `"corner collision"` or `"change of events"`. If the sequence
+    changes twice in one step, the second change may be missed.
 
     Where an impact grazes, the Jacobian is unbounded on one side. In a system with
     switching surfaces, the grazing is therefore located with equations that are smooth
