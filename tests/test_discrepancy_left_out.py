@@ -121,3 +121,43 @@ def test_a_step_moves_shared_values_in_all_recordings():
     values: Any = np.array([[1.0, 10.0], [1.0, 20.0]])
     after = moved(problem, blocks, values, np.array([0, 2]), np.array([0.5, 1.0]))
     assert np.array_equal(after, [[2.0, 10.0], [2.0, 23.0]])
+
+
+@pytest.mark.parametrize(
+    ("worse", "share", "named"),
+    [(20.0, 1e-3, True), (20.0, 0.0, False), (2e3, 1e-3, False)],
+)
+def test_a_term_replaces_a_function_if_it_explains_nearly_as_much(
+    worse, share, named, monkeypatch, unchecked_types
+):
+    """A share of 1e-3 of an explained cost of 1e6 may be lost; and a term that was
+    found is not replaced by another at a loss, or both would take turns.
+    """
+    policy = Policy()
+    found = _found(["a", "b"], 1000.0)
+
+    def fitted(subset, point, beaten):
+        slots = [one.slot for one in subset.functions]
+        cost = 1000.0 + worse * len(subset.names)
+        trial = _found(slots, cost, names=subset.names)
+        trial.fit.point = point
+        return trial
+
+    fits = types.SimpleNamespace(fitted=fitted, policy=policy)
+    left_out = LeftOut(fits, (), None, policy)  # pyright: ignore
+
+    def subset(found, out):
+        kept = [one for one in found.functions if one is not out]
+        names = found.names - {out} if isinstance(out, str) else found.names
+        return types.SimpleNamespace(functions=kept, names=names), None
+
+    def replacement(found, out, most):
+        if not isinstance(out, str) and out.slot != "a":
+            return None
+        return ("friction" if "drag" in found.names else "drag"), None
+
+    monkeypatch.setattr(left_out, "subset", subset)
+    monkeypatch.setattr(left_out, "replacement", replacement)
+    given: Any = found, (None,), lambda _: policy.small * 1e6, lambda *_: None
+    after = left_out.swapped(*given, share)
+    assert after.names == ({"drag"} if named else frozenset())

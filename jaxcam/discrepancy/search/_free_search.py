@@ -119,7 +119,9 @@ class FreeSearch:
             # forms do not make up for the parts left out: start from the complete fit
             curve, found = whole, self._formulated(whole)
         if len(found.functions) > 1 or found.names:
-            return found
+            # next to a form, a term may explain what it does not next to a curve
+            renamed = self._swapped(found, self.policy.corner_share)
+            return renamed if renamed.functions else found
         # a form may score slightly worse than the function that it replaces
         best = min(curve.score, found.score)
         for lead in self._others():
@@ -337,9 +339,9 @@ class FreeSearch:
             trial = self.fits.fitted(subset, point, beaten=beaten)
         return trial if math.isfinite(trial.score) else None
 
-    def _swapped(self, found: Missing) -> Missing:
+    def _swapped(self, found: Missing, share: float = 0.0) -> Missing:
         problems = (self.problem,) if self.roughly else (self.apart, self.problem)
-        return self.left_out.swapped(found, problems, self._small, self.progress)
+        return self.left_out.swapped(found, problems, self._small, self.progress, share)
 
     def shuffled(self, found: Missing, seed: int) -> tuple[Shuffled, ...]:
         """Return the gains of the knockoffs of all forces."""

@@ -135,13 +135,15 @@ class LeftOut:
         problems: Sequence[Problem],
         small: Callable[[Missing], float],
         progress,
+        share: float = 0.0,
     ) -> Missing:
-        """Replace earlier functions by terms that explain more.
+        """Replace earlier functions by terms that explain more, or nearly as much.
 
         A function found while the fit is poor may represent two effects.
 
         **Arguments:** the fit; the problems to fit in turn, the last of which decides;
-        `small(fit)`, the tolerated increase in cost.
+        `small(fit)`, the tolerated increase in cost; the `share` of the explained cost
+        that the replacement of a function may lose.
         """
         for out in (*found.functions, *sorted(found.names)):
             rest, _ = self.subset(found, out)
@@ -150,15 +152,18 @@ class LeftOut:
             if replaced is None:
                 continue
             rival, point = replaced
+            limit = found.score
+            if not isinstance(out, str):
+                limit += share * small(found) / self.policy.small
             progress(f"fitting {spelled(rival)}", None)
             names, trial = rest.names | {rival}, None
             for problem in problems:
                 subset = Subset(problem, rest.functions, names)
-                trial = self.fits.fitted(subset, point, beaten=found.score)
+                trial = self.fits.fitted(subset, point, beaten=limit)
                 point = trial.fit.point
                 # disconnected pieces cost less than connected ones
-                if not trial.fit.cost < found.score:
+                if not trial.fit.cost < limit:
                     break
-            if trial is not None and trial.score < found.score:
-                return self.swapped(trial, problems, small, progress)
+            if trial is not None and trial.score < limit:
+                return self.swapped(trial, problems, small, progress, share)
         return found
