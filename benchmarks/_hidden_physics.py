@@ -37,7 +37,7 @@ def _within(x, low, high):
     return 1.0 * ((x > low) & (x < high))
 
 
-def _direction(w):
+def direction(w):
     """The sign of a velocity, smoothed below a thousandth of the largest velocity, so
     that an integrator does not stall where the rig sticks.
     """
@@ -105,7 +105,7 @@ EFFECTS = {
     ),
     "stick_slip": _force(
         _AT_SPEED,
-        lambda u, w, phi, t, s: -_direction(w) * np.exp(-((w / 0.15) ** 2)),
+        lambda u, w, phi, t, s: -direction(w) * np.exp(-((w / 0.15) ** 2)),
         0.02,
         0.06,
     ),

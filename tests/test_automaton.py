@@ -244,7 +244,7 @@ def test_derivatives_contain_the_saltation_of_every_transition():
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_a_batch_agrees_with_single_motions_bit_by_bit_in_events():
+def test_a_batch_agrees_with_single_motions():
     starts = jnp.array([[0.0, 0.3], [0.2, 0.3], [-0.5, 0.3]])
     whole = jax.vmap(lambda x: flow(Belt(), x, 0.0, 20.0).state)(starts)
     single = jnp.stack([flow(Belt(), x, 0.0, 20.0).state for x in starts])
@@ -312,7 +312,7 @@ def test_friction_acts_in_every_mode():
 
 
 def test_impacts_and_modes_in_one_system():
-    """A ball that loses its weight at the second apex: closed-form times to 1e-10."""
+    """A ball that loses its weight below 0.1 m: closed-form times to 1e-10."""
 
     class Ball(HybridAutomaton):
         modes = ("up", "down", "weightless")
@@ -324,7 +324,7 @@ def test_impacts_and_modes_in_one_system():
             return jnp.stack([falls, falls, jnp.stack([state[1], 0 * state[0]])])
 
         def guards(self, t, state):
-            return jnp.stack([state[1], -state[1], state[0] - 0.1 - 0 * t])
+            return jnp.stack([state[1], -state[1], state[0] - 0.1])
 
         def gap(self, t, state):
             return state[0]
@@ -363,23 +363,16 @@ def test_a_stick_slip_cycle_of_three_modes_is_continued():
 
 
 def test_an_orbit_must_return_to_its_mode():
-    class Alternating(Thermostat):
-        def guards(self, t, state):
-            return jnp.stack([self.warm - state[0], state[0] - 18.0])
-
-        def start_mode(self, t, state):
-            return jnp.asarray(0)
-
     # in mode "cooling", the motion passes the state at which it was in "heating"
     there = 20.0
     late = float(np.log(10 / 8) + np.log(12 / 10))
     with pytest.raises(ValueError, match="is in mode cooling, but it started in heat"):
-        variational.orbit_of(Alternating(), [there], period=late)
+        variational.orbit_of(Thermostat(), [there], period=late)
 
 
 def test_a_runner_settles_to_a_steady_gait():
-    """Published behaviour: stable running at 67 and 68 degrees (Seyfarth 2002), with
-    the energy constant to 1e-6; at 66 degrees, every step is higher, until it falls.
+    """At 67 and 68 degrees, to 1e-6 m, with the energy constant to 1e-8; at 66 degrees,
+    every one of the first steps is higher than the last.
     """
     start = jnp.array([0.0, 1.0, 5.0, 0.0])
     for degrees in (67.0, 68.0):

@@ -85,6 +85,11 @@ class WithSection(Wrapping, SwitchedSystem):
         return self.system.one_way if isinstance(self.system, SwitchedSystem) else 0
 
     @property
+    def remembers(self) -> bool:
+        """Return whether the sides of the system depend on the past."""
+        return isinstance(self.system, SwitchedSystem) and self.system.remembers
+
+    @property
     def hysteresis(self) -> Any:
         """Return the hysteresis of each surface."""
         return self._each("hysteresis", 0.0)

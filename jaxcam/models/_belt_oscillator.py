@@ -21,7 +21,7 @@ class BeltOscillator(FilippovSystem):
     x'). The belt moves at constant speed and drags the mass with the force `friction /
     (1 + weakening |x' - belt|)`, which decreases with the slip speed, so the mass
     sticks and slips. Sticking of the mass is sliding (in the sense of Filippov) on the
-    surface x' = belt. The default parameters are those of the paper.
+    surface x' = belt.
 
     R. I. Leine, D. H. van Campen, A. de Kraker, L. van den Steen, Stick-slip vibrations
     induced by alternate friction models, Nonlinear Dynamics 16 (1998), 41-54.

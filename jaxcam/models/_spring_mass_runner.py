@@ -18,9 +18,11 @@ class SpringMassRunner(HybridAutomaton):
     and the foot, which does not slip; it takes off where it has its full length again.
     The modes are `falling`, `stance`, `rising` and, if the mass reaches the ground,
     `fallen`, where the motion ends; it starts in the mode `falling`, for example at an
-    apex. The state is (x, y, x', y'), where x is the distance of the mass ahead of the
-    last foothold. No energy is lost before a fall. With the default parameters, steps
-    from an apex height of 1 m at 5 m/s converge to a steady gait.
+    apex. If the mass takes off downwards, it would land at once, and the simulation
+    ends with `RESULTS.accumulates`. The state is (x, y, x', y'), where x is the
+    distance of the mass ahead of the last foothold. No energy is lost before a fall.
+    With the default parameters, steps from an apex height of 1 m at 5 m/s converge to a
+    steady gait.
 
     R. Blickhan, The spring-mass model for running and hopping, Journal of Biomechanics
     22 (1989), 1217-1227; A. Seyfarth, H. Geyer, M. Guenther, R. Blickhan, A movement
