@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 
 class Effect(NamedTuple):
@@ -33,10 +34,12 @@ class Effect(NamedTuple):
     states: int = 0
 
 
+@register_jitable
 def _within(x, low, high):
     return 1.0 * ((x > low) & (x < high))
 
 
+@register_jitable
 def direction(w):
     """The sign of a velocity, smoothed below a thousandth of the largest velocity, so
     that an integrator does not stall where the rig sticks.
@@ -92,7 +95,7 @@ EFFECTS = {
     ),
     "backlash": _force(
         _AT_PLACE,
-        lambda u, w, phi, t, s: np.clip(u, -0.3, 0.3) - u,
+        lambda u, w, phi, t, s: np.minimum(np.maximum(u, -0.3), 0.3) - u,
         0.15,
         0.5,
     ),
@@ -230,6 +233,12 @@ EFFECTS = {
     "thermal": Effect(
         "surface", ("time",), lambda u, w, phi, t, s: 1 - np.exp(-3 * t), (8.0, 25.0)
     ),
+    "dent": Effect(
+        "surface",
+        ("phase",),
+        lambda u, w, phi, t, s: -np.exp(12 * (np.cos(phi - 2.5) - 1)),
+        (5.0, 20.0),
+    ),
     # in the sensor
     "off_centre": Effect(
         "sensor",
@@ -272,14 +281,19 @@ class Hidden(NamedTuple):
         """The value of the effect, including any part that the rig parameters can
         represent.
         """
-        scales, effect = self.scales, self.effect
-        unit = {"force": scales.acceleration, "resonance": scales.acceleration}
-        unit |= {"surface": scales.noise, "sensor": scales.noise}
+        scales = self.scales
         share = np.clip(t / scales.lasts, 0.0, 1.0)
         u = (x - scales.middle) / scales.reach
         w = v / scales.velocity
-        value = effect.value(u, w, phi, share, s)
-        return self.size * unit.get(effect.kind, 1.0) * value
+        return self.unit * self.effect.value(u, w, phi, share, s)
+
+    @property
+    def unit(self) -> float:
+        """The size of the effect in the units of the rig."""
+        scales = self.scales
+        units = {"force": scales.acceleration, "resonance": scales.acceleration}
+        units |= {"surface": scales.noise, "sensor": scales.noise}
+        return self.size * units.get(self.effect.kind, 1.0)
 
     def rates(self, own, x, v):
         """Rates of change of the effect's own states."""

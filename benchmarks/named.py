@@ -16,17 +16,17 @@ import math
 import time
 
 import numpy as np
+from numba.extending import register_jitable
 
 from benchmarks._hidden_physics import direction, Effect, EFFECTS, Hidden, Scales
-from benchmarks._own_rig_makers import Accumulates, made_case, MAKERS
+from benchmarks._made_rigs import made_rig, MadeRig, NAMES
+from benchmarks._own_rig_makers import Accumulates
 from benchmarks._verdicts import close
-from benchmarks.own_rigs import drawn, RIGS
 from benchmarks.unnamed import function_off, scales_of
 from jaxcam.discrepancy import diagnose
-from jaxcam.fitting import read_setup
 
 
-_DURATION, _DRAWS = 6.0, 40
+_DRAWS = 40
 # reference speed of restitution in the library
 _IMPACT_SPEED = 0.3
 
@@ -62,38 +62,40 @@ def strength_of(name: str, hidden: Hidden) -> float | None:
 def together(one: Hidden, other: Hidden) -> Hidden:
     """Two forces as one."""
 
-    def value(*arguments):
-        first = one.size * one.effect.value(*arguments)
-        return first + other.size * other.effect.value(*arguments)
+    # numba compiles functions of functions that are marked
+    first, second = (register_jitable(each.effect.value) for each in (one, other))
+    size, more = one.size, other.size
+
+    def value(u, w, phi, t, s):
+        return size * first(u, w, phi, t, s) + more * second(u, w, phi, t, s)
 
     return Hidden(_force(value, 1.0, 1.0), 1.0, one.scales)
 
 
-def hidden_case(name: str, setup, effect: str, beside: str | None, seed: int):
+def hidden_case(rig: MadeRig, effect: str, beside: str | None, seed: int):
     """A named effect, an unnamed one or `None`, the recordings and the motions.
 
     **Raises:** `ValueError` if impacts accumulate in many rigs.
     """
     rng = np.random.default_rng([seed, *effect.encode(), *(beside or "").encode()])
     for _ in range(_DRAWS):
-        truth = drawn(setup, rng)
+        truth = rig.drawn(rng)
         try:
-            bare = made_case(name, setup, truth, rng, None, _DURATION)
-            scales = scales_of(setup, [motion for _, motion in bare])
+            bare = rig.made(truth, rng, None)
+            scales = scales_of(rig, [motion for _, motion in bare])
             if effect == "nonlinear_spring":
-                centre = float(setup.references.get("spring_center", 0.0))
-                scales = scales._replace(middle=centre)
+                scales = scales._replace(middle=rig.centre)
             if effect == "restitution_velocity":
                 scales = scales._replace(velocity=_IMPACT_SPEED)
             named = _sized(NAMED[effect], scales, rng)
             other = None if beside is None else _sized(EFFECTS[beside], scales, rng)
             both = named if other is None else together(named, other)
-            made = made_case(name, setup, truth, rng, both, _DURATION)
+            made = rig.made(truth, rng, both)
         except Accumulates:
             continue
         runs, motions = map(list, zip(*made))
         return named, other, runs, motions
-    raise ValueError(f"impacts accumulate in {_DRAWS} rigs of {name} with {effect}")
+    raise ValueError(f"impacts accumulate in {_DRAWS} rigs of {rig.name} with {effect}")
 
 
 def _sized(effect: Effect, scales: Scales, rng) -> Hidden:
@@ -131,25 +133,22 @@ def judged(found, effect: str, named: Hidden, other: Hidden | None, motions):
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("rig", choices=sorted(MAKERS))
+    parser.add_argument("rig", choices=NAMES)
     parser.add_argument("--effects", nargs="*", choices=sorted(NAMED))
     forces = sorted(name for name, one in EFFECTS.items() if one.kind == "force")
     parser.add_argument("--beside", choices=forces, help="a further, unnamed force")
     parser.add_argument("--first", type=int, default=0, help="seed of first case")
     parser.add_argument("--cases", type=int, default=1, help="cases per effect")
     args = parser.parse_args()
-    setup = read_setup(RIGS / f"{args.rig}.toml")
-    count, correct = 0, 0
+    rig, count, correct = made_rig(args.rig), 0, 0
     for name in args.effects or NAMED:
         if NAMED[name].kind == "restitution":
-            if args.beside or not MAKERS[args.rig].impacts:
+            if args.beside or not rig.struck:
                 continue
         for seed in range(args.first, args.first + args.cases):
-            named, other, runs, motions = hidden_case(
-                args.rig, setup, name, args.beside, seed
-            )
+            named, other, runs, motions = hidden_case(rig, name, args.beside, seed)
             begun, spent = time.time(), time.process_time()
-            found = diagnose(setup, runs, case=f"{args.rig} {name} {seed}")
+            found = diagnose(rig.given, runs, case=f"{args.rig} {name} {seed}")
             good, why = judged(found, name, named, other, motions)
             count, correct = count + 1, correct + good
             print(

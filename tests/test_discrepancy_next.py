@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.own_rigs import RIGS
+from benchmarks._made_rigs import made_rig
 from benchmarks.unnamed import hidden_case
 from jaxcam.data import DEMO_RIG
 from jaxcam.data.make_demo import DEMO_SENSORS, measure, RealRig, simulate_rig
 from jaxcam.discrepancy import diagnose, next_experiments
 from jaxcam.discrepancy.report import slopes_of_function
-from jaxcam.fitting import fit, Problem, read_setup
+from jaxcam.fitting import fit, Problem
 from jaxcam.recordings import read_case, read_rig, Recording, segment_case
 
 
@@ -53,12 +53,12 @@ def test_records_are_ranked_by_the_band_of_a_function():
 
     The rig and what is hidden in it are simulated by scipy.
     """
-    setup = read_setup(RIGS / "two_stops.toml")
-    _, runs, _, _ = hidden_case("two_stops", setup, "stop", 0)
-    found = diagnose(setup, runs)
+    rig = made_rig("two_stops")
+    _, runs, _, _ = hidden_case(rig, "stop", 0)
+    found = diagnose(rig.given, runs)
     (one,) = found.missing
     assert (one.kind, one.arguments) == ("force", ("position",))
-    proposed = next_experiments(found, setup)
+    proposed = next_experiments(found, rig.given)
     factors = [each.factor for each in proposed]
     assert factors == sorted(factors) and factors[-1] < 1
     best = proposed[0]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from swing_rig import Swing
 
-from benchmarks.own_rigs import RIGS
+from benchmarks._made_rigs import made_rig
 from benchmarks.unnamed import hidden_case, judged
 from jaxcam.discrepancy import diagnose
 from jaxcam.discrepancy.report._product import product_of, product_table
@@ -25,7 +25,7 @@ from jaxcam.discrepancy.terms import (
     Where,
     WithTerms,
 )
-from jaxcam.fitting import Model, Problem, read_setup, Sensor
+from jaxcam.fitting import Model, Problem, Sensor
 from jaxcam.models import ImpactOscillator, load_system, save_system
 from jaxcam.recordings import Recording, segment
 
@@ -178,9 +178,9 @@ def test_a_product_is_recognised_from_its_surface(first, gate, forms, numbers):
 def test_a_force_by_phase_beyond_a_position_is_a_product():
     """The verdict is right (see `benchmarks.unnamed`), with one formula of phase and
     position whose edge is within 5 % of the range."""
-    setup = read_setup(RIGS / "two_stops.toml")
-    hidden, runs, motions, _ = hidden_case("two_stops", setup, "pulled_end", 960)
-    found = diagnose(setup, runs)
+    rig = made_rig("two_stops")
+    hidden, runs, motions, _ = hidden_case(rig, "pulled_end", 960)
+    found = diagnose(rig.given, runs)
     right, why = judged(found, hidden, motions)
     assert right, why
     (one,) = found.missing

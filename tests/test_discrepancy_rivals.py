@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks.own_rigs import RIGS
+from benchmarks._made_rigs import made_rig
 from benchmarks.unnamed import hidden_case, judged
 from jaxcam.discrepancy import diagnose, Policy
 from jaxcam.discrepancy.evidence import _rivals, _unnamed
@@ -15,7 +15,6 @@ from jaxcam.discrepancy.search._local_force import _in_reverse, Response
 from jaxcam.discrepancy.search._shuffled import _at_other_moments
 from jaxcam.discrepancy.terms import Place
 from jaxcam.discrepancy.terms._primitives import PRIMITIVES
-from jaxcam.fitting import read_setup
 
 
 @pytest.mark.parametrize("primitive", PRIMITIVES, ids=lambda one: one.name)
@@ -96,9 +95,9 @@ def test_a_force_that_a_knockoff_equals_is_not_reported(
 def test_a_sharp_edge_is_found_behind_a_smooth_rival(rig, effect):
     """Kind and variables right, nine tenths of the squared error gone, the function
     within 0.4 of its rms (see `benchmarks.unnamed`)."""
-    setup = read_setup(RIGS / f"{rig}.toml")
-    hidden, runs, motions, _ = hidden_case(rig, setup, effect, 0)
-    right, why = judged(diagnose(setup, runs), hidden, motions)
+    made = made_rig(rig)
+    hidden, runs, motions, _ = hidden_case(made, effect, 0)
+    right, why = judged(diagnose(made.given, runs), hidden, motions)
     assert right, why
 
 
