@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks._made_rigs import made_rig
 from benchmarks._own_rig_makers import Accumulates, made_case
+from benchmarks.named import hidden_case
 from benchmarks.own_rigs import drawn
 from jaxcam.fitting import fit, read_setup
 from jaxcam.recordings import Recording
@@ -68,3 +70,16 @@ def test_low_bounces_leave_no_misfit(bouncing):
     found = fit(setup.problem(runs))
     assert found.converged
     assert abs(found.cost / found.problem.samples - 1) < 0.01
+
+
+def test_a_slow_impact_that_polynomials_contradict_is_found_by_the_model():
+    """A boundary within 3 ms of each impact on the wall. One of them, at 1.452 s, is so
+    slow that polynomials fitted to both flights give the wrong sign of the approach
+    speed.
+    """
+    made = made_rig("two_masses")
+    _, _, runs, motions = hidden_case(made, "nonlinear_spring", None, 4701)
+    for part, motion in zip(made.given.segments(runs), motions):
+        pairs = [(flight.start.time, flight.stop.time) for flight in part.flights]
+        off = np.abs(np.ravel(pairs)[:, None] - motion.struck[:, 0])
+        assert np.all(np.min(off, axis=0) < 3e-3)

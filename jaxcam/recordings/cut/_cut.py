@@ -75,12 +75,14 @@ def cut(
             for place, number in marks.items()
             if place in before and place in after
         }
-        # a velocity jump while the motion leaves the surface is not an impact on it
+        # a velocity jump while the motion leaves the surface is not an impact on it,
+        # unless a model of the flight contradicts the polynomials fitted here
         long = {last for first, last in spans if last - first >= _LONG}
         wrong = [
             place
             for place in marks
             if place in crossed and place in long and _leaves(crossed[place])
+            if not any(a < place < b for a, b in doubted)
         ]
         if not wrong:
             break
