@@ -72,6 +72,7 @@ def test_low_bounces_leave_no_misfit(bouncing):
     assert abs(found.cost / found.problem.samples - 1) < 0.01
 
 
+@pytest.mark.slow
 def test_a_slow_impact_that_polynomials_contradict_is_found_by_the_model():
     """A boundary within 3 ms of each impact on the wall. One of them, at 1.452 s, is so
     slow that polynomials fitted to both flights give the wrong sign of the approach
