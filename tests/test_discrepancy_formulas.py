@@ -27,6 +27,7 @@ NUMBERS = {
     "power": (0.6, 2.2),
     "wave": (0.7, 2.3, 0.4),
     "forward": (0.6,),
+    "backward": (0.6,),
     "dry": (-0.4,),
     "falling": (0.6, 0.2),
     "curved above": (-3.0, 0.6, 1.5),

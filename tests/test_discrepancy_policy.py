@@ -105,6 +105,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "CUBE",
         "DRY",
         "FORWARD",
+        "BACKWARD",
         # where a scan of edges, speeds and hidden elements looks, and in what chunks
         "_SHARES",
         "_BEGINS",

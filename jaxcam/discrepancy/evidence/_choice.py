@@ -80,8 +80,12 @@ def choose(
     named = supported(question, trials, found, seed)
     separate = _separate_values(trials, named, textbook)
     functions, useless, predicted = Unnamed(), None, None
-    if named.left and unnamed and policy.functions and not separate.settled:
-        given = question, trials, named.best, named.left, seed
+    instead = named.direction
+    if instead is not None and instead.worse > -policy.tie:
+        instead = None
+    sought = (named.left or instead is not None) and not separate.settled
+    if sought and unnamed and policy.functions:
+        given = question, trials, named.best, named.left, instead, seed
         functions = without_a_name(*given, earlier, loosely)
     rest = _within(trials, textbook, named.best.fit)
     if functions.found is not None:

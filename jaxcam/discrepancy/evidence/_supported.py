@@ -5,7 +5,14 @@ from typing import NamedTuple
 
 from ...fitting import Fit
 from ..policy import Policy
-from ..search import Question, Trial, Trials, within_tolerances
+from ..search import (
+    one_direction,
+    OneDirection,
+    Question,
+    Trial,
+    Trials,
+    within_tolerances,
+)
 from ._beyond_tolerance import acting_alike, Beyond, beyond_tolerance
 from ._held_out import held_out, HeldOut
 from ._masked import unmasked
@@ -41,6 +48,7 @@ class Supported:
     - `left_before`, `left_after`: structures in the residuals of the textbook model,
         and of the named terms.
     - `held`: a prediction of held-out data, if one was needed.
+    - `direction`: friction in one direction of motion, if Coulomb friction is named.
     """
 
     found: Trial
@@ -55,6 +63,7 @@ class Supported:
     left_before: list[Structure]
     left_after: list[Structure]
     held: HeldOut | None
+    direction: OneDirection | None
 
     @property
     def left(self) -> list[Structure]:
@@ -73,6 +82,7 @@ class Supported:
             beyond=[],
             left_after=self.left_before,
             held=None,
+            direction=None,
         )
 
 
@@ -130,6 +140,7 @@ def supported(question: Question, trials: Trials, found: Trial, seed: int) -> Su
         left_before=left_before,
         left_after=left_after,
         held=held,
+        direction=one_direction(trials, best),
     )
 
 

@@ -9,7 +9,9 @@ from ..policy import Policy
 from ..search import (
     decoys_of,
     FreeSearch,
+    in_one_direction,
     Missing,
+    OneDirection,
     Question,
     rank_decoys,
     refitted,
@@ -49,6 +51,7 @@ def without_a_name(
     trials: Trials,
     best: Trial,
     left: list[Structure],
+    instead: OneDirection | None,
     seed: int,
     earlier: Sequence[Missing] = (),
     loosely: bool = False,
@@ -62,12 +65,17 @@ def without_a_name(
     `earlier` fits, refitted to these recordings, leaves only noise, nothing else is
     sought. If these fits allowed for model errors (`loosely`), no other residual is
     tolerated, because the right function may not be among them.
+
+    Friction in one direction of motion is tried `instead` of Coulomb friction; if it
+    leaves only noise, nothing else is sought.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     problem = question.problem
     near = best.fit.cost < policy.near_cost * problem.samples
     small = policy.small if near else policy.corner_share
-    if best.names and max(one.gain for one in left) < small * (bare - best.fit.cost):
+    most = max((one.gain for one in left), default=0.0)
+    tolerable = bool(best.names) and most < small * (bare - best.fit.cost)
+    if tolerable and instead is None:
         return Unnamed()
     visited = visited_states(problem)
     positions, velocities, approach, times = visited.ranges(policy)
@@ -85,8 +93,8 @@ def without_a_name(
 
     by_chance: list[Shuffled] = []
 
-    def searched(elements: bool, policy: Policy = policy):
-        search = FreeSearch(
+    def begun(elements: bool, policy: Policy = policy):
+        return FreeSearch(
             problem,
             question.rig,
             question.terms,
@@ -98,6 +106,9 @@ def without_a_name(
             trials.clock,
             bool(question.model_errors),
         )
+
+    def searched(elements: bool, policy: Policy = policy):
+        search = begun(elements, policy)
         known = refitted(search, () if elements else earlier)
         if known is None or search.falls_short(known, tolerated=not loosely):
             others = search.run()
@@ -107,6 +118,14 @@ def without_a_name(
             rank_decoys(search, known)
         return search, *_needed(search, known, best.bic, seed, by_chance)
 
+    if instead is not None:
+        trial = begun(False)
+        known = in_one_direction(trial, offered, best, instead)
+        if tolerable or not trial.falls_short(known):
+            rank_decoys(trial, known)
+            found, its = _needed(trial, known, best.bic - policy.tie, seed, by_chance)
+            if found is not None or tolerable:
+                return Unnamed(found, its)
     # elements with an internal state are tried only if functions may not suffice
     always = policy.elements > 1
     results = [searched(always)]

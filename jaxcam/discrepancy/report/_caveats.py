@@ -13,7 +13,8 @@ from ..evidence import (
     rms_of,
 )
 from ..policy import Policy
-from ..search import Question, Shuffled, Trial, Trials
+from ..search import OneDirection, Question, Shuffled, Trial, Trials
+from ..terms import CoulombFriction
 from ._caveat import Caveat, Reason
 from ._words import listed, number, percent, quantity, ratio, spelled
 
@@ -40,6 +41,9 @@ def caveats_of(
         yield _far(trials)
     for trial in ties:
         yield _tie(choice.named.best, trial)
+    direction = choice.named.direction
+    if direction is not None and abs(direction.worse) <= trials.policy.tie:
+        yield _in_one_direction(direction)
     apart = not_shared(choice, trials.policy)
     if apart and not (choice.differing is not None and choice.differing.complete):
         yield Caveat(
@@ -52,6 +56,18 @@ def caveats_of(
         yield differs(choice.differing, trials.policy)
     if choice.held.after > trials.policy.as_noise:
         yield above_noise(choice.held, named)
+
+
+def _in_one_direction(direction: OneDirection) -> Caveat:
+    when = "positive" if direction.size < 0 else "negative"
+    return Caveat(
+        Reason.TIE,
+        f"Dry friction that acts only at {when} velocities would explain the data as "
+        "well as Coulomb friction does, because the rig parameters can represent a "
+        "constant force within their tolerances. To tell the two apart, measure "
+        f"{spelled(direction.hidden)} more accurately.",
+        (CoulombFriction.name,),
+    )
 
 
 def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:

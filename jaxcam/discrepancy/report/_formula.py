@@ -25,6 +25,7 @@ _FORMULAS = {
     "wave": "{size}*cos({wavenumber}*({x} - {low}) - {lead})",
     "dry": "{size}*sign({x})",
     "forward": "{size}*({x} > 0)",
+    "backward": "{size}*({x} < 0)",
     "falling": "{size}*sign({x})*exp(-({x}/{decay})**2)",
     "curved above": "{size}*(max({x} - {a}, 0)/{range})**{exponent}",
     "curved below": "{size}*(max({a} - {x}, 0)/{range})**{exponent}",
@@ -53,6 +54,7 @@ _WORDS = {
     "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
     "dry": "has a constant size and the direction of the {x}",
     "forward": "acts only while the {x} is positive",
+    "backward": "acts only while the {x} is negative",
     "falling": "opposes the motion near rest and decreases with the {x}, over about "
     "{decay}",
     "curved above": "acts only above {x} {a}, and grows from there with "

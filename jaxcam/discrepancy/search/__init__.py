@@ -31,6 +31,11 @@ from ._model_error import (
     with_model_error as with_model_error,
 )
 from ._named_terms import with_terms as with_terms
+from ._one_direction import (
+    in_one_direction as in_one_direction,
+    one_direction as one_direction,
+    OneDirection as OneDirection,
+)
 from ._question import (
     Candidates as Candidates,
     FittedSpeed as FittedSpeed,

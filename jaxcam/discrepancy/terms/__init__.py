@@ -30,6 +30,7 @@ from ._hidden_force import (
     STARTS as STARTS,
 )
 from ._library import (
+    CoulombFriction as CoulombFriction,
     DriveRipple as DriveRipple,
     library as library,
     saved_classes as saved_classes,
@@ -42,6 +43,8 @@ from ._location import (
 from ._motion_scales import MotionScales as MotionScales
 from ._moving_surface import moves_surface as moves_surface
 from ._primitives import (
+    BACKWARD as BACKWARD,
+    FORWARD as FORWARD,
     MOST_PARTS as MOST_PARTS,
     Place as Place,
     Primitive as Primitive,
@@ -64,6 +67,7 @@ from ._shapes import (
     Variable as Variable,
 )
 from ._spelled import spelled as spelled
+from ._springs import ConstantForce as ConstantForce
 from ._switched_base import (
     SwitchedWithHidden as SwitchedWithHidden,
     SwitchedWithTerms as SwitchedWithTerms,

@@ -267,6 +267,7 @@ WAVE = Primitive(
 )
 DRY = Primitive("dry", lambda at, p: p[0] + 0.0 * at.u, odd=True)
 FORWARD = Primitive("forward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=0.5)
+BACKWARD = Primitive("backward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=-0.5)
 FALLING = Primitive(
     "falling",
     lambda at, p: p[0] * at.xp.exp(-((at.v / p[1]) ** 2)),
@@ -340,7 +341,7 @@ ON_A_LINE = (
     SATURATING,
 )
 FROM_ZERO = (POWER,)
-OF_SPEED = (FORWARD, FALLING, FAST, POWER_OF_SPEED)
+OF_SPEED = (FORWARD, BACKWARD, FALLING, FAST, POWER_OF_SPEED)
 # dry friction alone is a named term
 ONLY_IN_SUMS = (DRY,)
 OF_PHASE = (*HARMONICS, HALF_TURN, ARC, BUMP_IN_TURN)
