@@ -61,6 +61,7 @@ def chosen(monkeypatch, unchecked_types):
         search = types.SimpleNamespace(promising=lambda _: ranked(sums))
         monkeypatch.setattr(_formulas, "SumSearch", lambda *_: search)
         monkeypatch.setattr(_formulas, "_sound", lambda *_: True)
+        monkeypatch.setattr(_formulas, "friction_named", lambda *_: False)
         monkeypatch.setattr(_formulas._Trials, "_fitted", fitted)
         fits = types.SimpleNamespace(policy=Policy())
         found, _ = _formulas.formulated(

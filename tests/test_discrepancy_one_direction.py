@@ -10,8 +10,9 @@ from benchmarks.named import hidden_case as named_case
 from benchmarks.unnamed import hidden_case, judged
 from jaxcam.discrepancy import diagnose
 from jaxcam.discrepancy.search import _one_direction, one_direction
-from jaxcam.discrepancy.search._one_direction import BACKWARD, FORWARD
-from jaxcam.discrepancy.terms import CoulombFriction
+from jaxcam.discrepancy.search._named_parts import without_friction
+from jaxcam.discrepancy.terms import BACKWARD, CoulombFriction, DRY, FORWARD, sum_of
+from jaxcam.discrepancy.terms._primitives import CUBE, FALLING
 
 
 FRICTION, KNOWN, PRIOR = 0.3, 400.0, 25.0
@@ -106,3 +107,35 @@ def test_coulomb_friction_is_not_explained_by_one_direction():
     _, _, runs, _ = named_case(rig, "coulomb_friction", None, 4801)
     found = diagnose(rig.given, runs)
     assert [one.name for one in found.effects] == ["coulomb_friction"]
+
+
+@pytest.mark.parametrize(
+    ("parts", "numbers", "friction", "form", "left"),
+    [
+        # friction of 0.5 in one direction and 0.2 in the other
+        ((FORWARD, BACKWARD), (-0.5, 0.2), 0.2, "forward", (-0.3,)),
+        ((BACKWARD, FORWARD), (0.5, -0.2), 0.2, "backward", (0.3,)),
+        ((DRY, FALLING), (-0.4, -0.1, 0.2), 0.4, "falling", (-0.1, 0.2)),
+    ],
+)
+def test_coulomb_friction_is_taken_from_a_sum(parts, numbers, friction, form, left):
+    found = without_friction(sum_of(parts, [1.0] * len(parts)), np.array(numbers))
+    assert found is not None
+    assert found[0] == pytest.approx(friction)
+    assert found[1].name == form
+    np.testing.assert_allclose(found[2], left)
+
+
+@pytest.mark.parametrize(
+    ("parts", "numbers"),
+    [
+        # a force that pushes in both directions is no friction
+        ((FORWARD, BACKWARD), (0.5, -0.2)),
+        ((FORWARD, BACKWARD), (-0.5, -0.2)),
+        ((FORWARD, CUBE), (-0.5, 1.0)),
+        ((FORWARD,), (-0.5,)),
+    ],
+)
+def test_other_sums_contain_no_coulomb_friction(parts, numbers):
+    form = sum_of(parts, [1.0] * len(parts)) if len(parts) > 1 else parts[0]
+    assert without_friction(form, np.array(numbers)) is None

@@ -16,6 +16,7 @@ from ._curve_likelihood import CurveLikelihood, promising, Start
 from ._free_fits import FreeFits, heat_of, Missing, Subset
 from ._hidden_state import Hidden
 from ._leads import shows_apart
+from ._named_parts import friction_named, with_named_friction
 from ._roughness import Roughness
 from ._slots import emptied, Free, Part, replaced
 from ._sums_of_forms import SumSearch
@@ -40,13 +41,29 @@ def formulated(
         likelihood = CurveLikelihood.about(fits, found, one)
         trials = _Trials(fits, found, apart, one, small, progress, clock)
         trials.run(trials.compared(promising(likelihood, fits.policy.followed)))
+        search = None
         if trials.kept is None and not trials.close:
             search = SumSearch(likelihood, fits.policy.small)
             sums = search.promising(fits.policy.followed)
             trials.run([start for start in sums if trials.may_do(start, likelihood)])
         tried += trials.sound
         found = trials.kept or found
+        if friction_named(fits, found, one):
+            allowed, form = fits.policy.form_loss, _in_slot(found, slot)
+            assert isinstance(form, Free)
+            if form.primitive is not None:
+                sums = [(form.primitive, _numbers_of(found, form))]
+            else:
+                search = search or SumSearch(likelihood, fits.policy.small)
+                allowed += fits.policy.corner_share * small / fits.policy.small
+                sums = search.with_friction(fits.policy.followed)
+            found = with_named_friction(fits, found, form, sums, allowed, progress)
     return found, tried
+
+
+def _numbers_of(found: Missing, one: Free) -> np.ndarray:
+    """Return the fitted parameters of a function."""
+    return np.array([found.fit[name].value for name in one.coefficients])
 
 
 class _Trials:
@@ -212,7 +229,7 @@ def _sound(trial: Missing, one: Free) -> bool:
     """Return whether a form has finite evidence and valid parameters."""
     form = _in_slot(trial, one.slot)
     assert isinstance(form, Free) and form.primitive is not None
-    numbers = [trial.fit[name].value for name in form.coefficients]
+    numbers = _numbers_of(trial, form).tolist()
     return math.isfinite(trial.score) and form.within(numbers)
 
 

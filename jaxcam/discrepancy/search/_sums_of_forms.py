@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from ..terms import MOST_PARTS, Primitive, sum_of
+from ..terms import BACKWARD, DRY, FORWARD, MOST_PARTS, Primitive, sum_of
 from ._curve_likelihood import CurveLikelihood, Start, Vectors
+from ._named_parts import without_friction
 
 
 # Squared correlation above which the data do not distinguish two forms
@@ -114,6 +115,33 @@ class SumSearch:
             found += self._refined(guesses[:_REFINED])
         found = _best_of([*found, *self._exchanged(found)])
         return [Start(one.gain, one.form, one.numbers) for one in found[:most]]
+
+    def with_friction(self, most: int) -> list[tuple[Primitive, np.ndarray]]:
+        """Return the sums of two forms of the velocity, with their parameters, that
+        contain Coulomb friction, the most likely first.
+        """
+        pairs = [
+            one
+            for one in _best_of(self._pairs())
+            if without_friction(one.form, one.numbers) is not None
+        ]
+        found = _best_of([*self._refined(pairs[:_REFINED]), *self._one_sided()])
+        return [(one.form, one.numbers) for one in found[:most]]
+
+    def _one_sided(self) -> Iterator[_Sum]:
+        """Yield sums of Coulomb friction and friction in one direction of motion.
+
+        Forces in the two directions may be much alike, so the other sums leave them
+        out.
+        """
+        for form, sense in ((FORWARD, 1.0), (BACKWARD, -1.0)):
+            parts = DRY, form
+            seen = np.array([self.vectors.seen(part, np.ones(1)) for part in parts])
+            sizes = np.linalg.lstsq(seen.T, self.best, rcond=None)[0]
+            gain = float(self.best @ (sizes @ seen)) - 2 * self.likelihood.price
+            # both oppose the motion
+            if sizes[0] < 0 and sense * sizes[1] < 0:
+                yield _Sum(gain, parts, sizes)
 
     def _exchanged(self, sums: Sequence[_Sum]) -> list[_Sum]:
         """Return the sums obtained from the best one by replacing one part at a time,

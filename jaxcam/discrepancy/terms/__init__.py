@@ -44,6 +44,7 @@ from ._motion_scales import MotionScales as MotionScales
 from ._moving_surface import moves_surface as moves_surface
 from ._primitives import (
     BACKWARD as BACKWARD,
+    DRY as DRY,
     FORWARD as FORWARD,
     MOST_PARTS as MOST_PARTS,
     Place as Place,
