@@ -138,3 +138,14 @@ def test_a_part_that_hardly_counts_is_left_out():
     for start in SumSearch(likelihood, 0.15**2).promising(3):
         sizes = [own[0] for _, own in start.primitive.divided(start.numbers)]
         assert min(map(abs, sizes)) > 0.05
+
+
+@pytest.mark.parametrize("true", [{"forward": -0.4}, {"backward": 0.4}])
+def test_friction_that_differs_in_the_two_directions_is_recognised(true):
+    """Coulomb friction and a force in one direction that opposes the motion, each to
+    1e-9, also where forces in the two directions are almost alike to the data."""
+    ((name, size),) = true.items()
+    likelihood = _likelihood(Variable.VELOCITY, 1e4, dry=[(-0.5,)], **{name: [(size,)]})
+    (form, numbers), *_ = SumSearch(likelihood).with_friction(3)
+    assert [part.name for part in form.parts] == ["dry", name]
+    np.testing.assert_allclose(numbers, (-0.5, size), rtol=1e-9)

@@ -66,14 +66,17 @@ def without_a_name(
     sought. If these fits allowed for model errors (`loosely`), no other residual is
     tolerated, because the right function may not be among them.
 
-    Friction in one direction of motion is tried `instead` of Coulomb friction; if it
-    leaves only noise, nothing else is sought.
+    Friction in one direction of motion is tried `instead` of Coulomb friction. If it
+    leaves only noise, or if what Coulomb friction leaves does not count, nothing else
+    is sought.
     """
     policy, bare = trials.policy, trials.known[frozenset()].fit.cost
     problem = question.problem
     near = best.fit.cost < policy.near_cost * problem.samples
     small = policy.small if near else policy.corner_share
     most = max((one.gain for one in left), default=0.0)
+    if not _admits(question, best):
+        instead = None
     tolerable = bool(best.names) and most < small * (bare - best.fit.cost)
     if tolerable and instead is None:
         return Unnamed()
@@ -93,7 +96,7 @@ def without_a_name(
 
     by_chance: list[Shuffled] = []
 
-    def begun(elements: bool, policy: Policy = policy):
+    def new_search(elements: bool, policy: Policy = policy):
         return FreeSearch(
             problem,
             question.rig,
@@ -108,7 +111,7 @@ def without_a_name(
         )
 
     def searched(elements: bool, policy: Policy = policy):
-        search = begun(elements, policy)
+        search = new_search(elements, policy)
         known = refitted(search, () if elements else earlier)
         if known is None or search.falls_short(known, tolerated=not loosely):
             others = search.run()
@@ -119,13 +122,14 @@ def without_a_name(
         return search, *_needed(search, known, best.bic, seed, by_chance)
 
     if instead is not None:
-        trial = begun(False)
-        known = in_one_direction(trial, offered, best, instead)
-        if tolerable or not trial.falls_short(known):
-            rank_decoys(trial, known)
-            found, its = _needed(trial, known, best.bic - policy.tie, seed, by_chance)
+        search = new_search(False)
+        known = in_one_direction(search, offered, best, instead)
+        if tolerable or not search.falls_short(known):
+            rank_decoys(search, known)
+            least = best.bic - policy.tie
+            found, its = _needed(search, known, least, seed, by_chance)
             if found is not None or tolerable:
-                return Unnamed(found, its)
+                return Unnamed(found, its, by_chance=tuple(by_chance))
     # elements with an internal state are tried only if functions may not suffice
     always = policy.elements > 1
     results = [searched(always)]
@@ -142,6 +146,14 @@ def without_a_name(
     chosen, its_needs = min(kept, key=lambda each: each[0].score)
     tried = [one for search, _, _ in results for one in search.tried]
     return Unnamed(chosen, its_needs, rivals(chosen, tried, policy, seed))
+
+
+def _admits(question: Question, best: Trial) -> bool:
+    """Return whether the named terms can be fitted together with functions: none of
+    them has an inner parameter.
+    """
+    named = [term for term in question.terms if term.name in best.names]
+    return not any(one.inner for term in named for one in term.strengths())
 
 
 def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:

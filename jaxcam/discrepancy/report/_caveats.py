@@ -42,7 +42,7 @@ def caveats_of(
     for trial in ties:
         yield _tie(choice.named.best, trial)
     direction = choice.named.direction
-    if direction is not None and abs(direction.worse) <= trials.policy.tie:
+    if direction is not None and direction.worse <= trials.policy.tie:
         yield _in_one_direction(direction)
     apart = not_shared(choice, trials.policy)
     if apart and not (choice.differing is not None and choice.differing.complete):
@@ -62,9 +62,9 @@ def _in_one_direction(direction: OneDirection) -> Caveat:
     when = "positive" if direction.size < 0 else "negative"
     return Caveat(
         Reason.TIE,
-        f"Dry friction that acts only at {when} velocities would explain the data as "
-        "well as Coulomb friction does, because the rig parameters can represent a "
-        "constant force within their tolerances. To tell the two apart, measure "
+        f"Dry friction that acts only at {when} velocities would explain the data at "
+        "least as well as Coulomb friction does, because the rig parameters can "
+        "represent a constant force. To tell the two apart, measure "
         f"{spelled(direction.hidden)} more accurately.",
         (CoulombFriction.name,),
     )

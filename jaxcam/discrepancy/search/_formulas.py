@@ -57,7 +57,11 @@ def formulated(
                 search = search or SumSearch(likelihood, fits.policy.small)
                 allowed += fits.policy.corner_share * small / fits.policy.small
                 sums = search.with_friction(fits.policy.followed)
-            found = with_named_friction(fits, found, form, sums, allowed, progress)
+            named = with_named_friction(fits, found, form, sums, progress, clock)
+            named = [trial for trial in named if _sound(trial, form)]
+            tried += named
+            best = min(named, key=lambda trial: trial.score, default=found)
+            found = best if best.score < found.score + allowed else found
     return found, tried
 
 

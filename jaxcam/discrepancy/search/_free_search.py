@@ -115,10 +115,10 @@ class FreeSearch:
         found = self._pruned(whole)
         found = simplified(self.fits, self.problem, found, self.progress)
         curve, found = found, self._formulated(found)
-        if self._lacks(found, whole):
+        if self._lacks(curve, found, whole):
             # forms do not make up for the parts left out: start from the complete fit
             curve, found = whole, self._formulated(whole)
-        if len(found.functions) > 1 or found.names:
+        if len(curve.functions) > 1 or curve.names:
             # next to a form, a term may explain what it does not next to a curve
             renamed = self._swapped(found, self.policy.corner_share)
             return renamed if renamed.functions else found
@@ -136,13 +136,12 @@ class FreeSearch:
                 found, best = other, score
         return found
 
-    def _lacks(self, found: Missing, whole: Missing) -> bool:
-        """Return whether functions or terms that were left out of a fit are needed.
-
-        This is the case if only the fit with them leaves nothing but noise, or if the
-        fit is poor and they explain most of what remains.
+    def _lacks(self, curve: Missing, found: Missing, whole: Missing) -> bool:
+        """Return whether functions or terms that the `curve` leaves out are needed, in
+        spite of the formulas `found`: only the `whole` fit leaves nothing but noise, or
+        the fit is poor and they explain most of what remains.
         """
-        few, many = (len(one.functions) + len(one.names) for one in (found, whole))
+        few, many = (len(one.functions) + len(one.names) for one in (curve, whole))
         if few == many or leaves_noise(self.fits, found):
             return False
         if leaves_noise(self.fits, whole):

@@ -13,8 +13,11 @@ from ..terms import (
     FORWARD,
     Primitive,
     sum_of,
+    Term,
     Variable,
+    Where,
 )
+from ._clock import Clock
 from ._free_fits import FreeFits, Missing, Subset
 from ._roughness import Roughness
 from ._slots import emptied, Free, replaced
@@ -22,10 +25,17 @@ from ._slots import emptied, Free, replaced
 
 def friction_named(fits: FreeFits, found: Missing, one: Free) -> bool:
     """Return whether Coulomb friction may be named in addition to a function."""
-    offered = any(term.name == CoulombFriction.name for term in fits.terms)
-    of_velocity = one.family.argument, one.family.factor, one.gate
+    family = one.family.where, one.family.argument, one.family.factor, one.gate
+    of_velocity = family == (Where.FLIGHT, Variable.VELOCITY, Factor.ONE, None)
     free = CoulombFriction.name not in found.names
-    return free and offered and of_velocity == (Variable.VELOCITY, Factor.ONE, None)
+    return of_velocity and free and any(map(friction_in_flight, fits.terms))
+
+
+def friction_in_flight(term: Term) -> bool:
+    """Return whether a term is the Coulomb friction of the first coordinate, on which
+    unnamed forces act.
+    """
+    return isinstance(term, CoulombFriction) and term.coordinate == 0
 
 
 def with_named_friction(
@@ -33,23 +43,21 @@ def with_named_friction(
     found: Missing,
     one: Free,
     sums: Iterable[tuple[Primitive, np.ndarray]],
-    allowed: float,
     progress,
-) -> Missing:
-    """Return a fit with Coulomb friction as a named term and another form, in place of
-    a function of the velocity.
+    clock: Clock,
+) -> list[Missing]:
+    """Return fits with Coulomb friction as a named term and another form, in place of a
+    function of the velocity.
 
     **Arguments:** the function; sums of forms that contain friction, with their
-    parameters, in the order in which they are tried; the tolerated increase in the
-    score.
-
-    **Returns:** the fit before if none of the sums has enough evidence.
+    parameters; the limit of the time.
     """
-    term = next(term for term in fits.terms if term.name == CoulombFriction.name)
+    term = next(term for term in fits.terms if friction_in_flight(term))
     own, problem = [strength.name for strength in term.strengths()], found.problem
+    tried = []
     for whole, numbers in sums:
         split = without_friction(whole, numbers)
-        if split is None:
+        if split is None or clock.over:
             continue
         friction, rest, left = split
         size = Roughness(size=abs(float(left[0])))
@@ -62,9 +70,9 @@ def with_named_friction(
         progress(f"fitting Coulomb friction and a formula: {rest.name}", None)
         subset = Subset(problem, parts, found.names | {term.name})
         trial = fits.fitted(subset, point)
-        if trial.score < found.score + allowed:
-            return trial
-    return found
+        if all(trial.fit[name].value > 0 for name in own):
+            tried.append(trial)
+    return tried
 
 
 def without_friction(
@@ -89,6 +97,8 @@ def without_friction(
     for part, own in parts:
         own[0] += taken.get(part.name, 0.0)
     kept = [(part, own) for part, own in parts if own[0] != 0]
+    if not kept:
+        return None
     rest = tuple(part for part, _ in kept)
     whole = rest[0] if len(rest) == 1 else sum_of(rest, [own[0] for _, own in kept])
     return friction, whole, np.concatenate([own for _, own in kept])

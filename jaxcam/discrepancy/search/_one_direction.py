@@ -1,8 +1,9 @@
 """Dry friction that acts in one direction of motion only.
 
 It equals Coulomb friction of half its size and a constant force, and the parameters of
-a rig may represent a constant force. If they must leave their nominal values for that,
-the recordings favour friction in one direction.
+a rig may represent a constant force. If, with Coulomb friction, they are far from their
+nominal values because they represent such a force, friction in one direction is more
+likely.
 """
 
 from collections.abc import Sequence
@@ -26,6 +27,7 @@ from ._free_fits import heat_of, Missing, Subset
 from ._free_search import FreeSearch
 from ._gains import gain, newton_step
 from ._local_force import force_blocks
+from ._named_parts import friction_in_flight
 from ._roughness import Roughness
 from ._slots import Free, replaced, slots_of
 from ._trials import Trial, Trials
@@ -47,31 +49,50 @@ class OneDirection(NamedTuple):
 
 def one_direction(trials: Trials, best: Trial) -> OneDirection | None:
     """Return the more likely direction, according to the quadratic likelihood about a
-    fit; `None` if the fit has no Coulomb friction.
+    fit; `None` if the fit has no Coulomb friction in flight, or a constant force.
     """
-    if CoulombFriction.name not in best.names:
+    friction = [
+        term
+        for term in trials.terms
+        if term.name in best.names and friction_in_flight(term)
+    ]
+    if not friction or ConstantForce.name in best.names:
         return None
-    (strength,) = trials.term(CoulombFriction.name).strengths()
-    friction = best.fit[strength.name].value
-    response = trials.response(best.names)
+    (strength,) = friction[0].strengths()
+    value = best.fit[strength.name].value
+    response, heat = trials.response(best.names), heat_of(best.fit)
     blocks = force_blocks(trials.problem, response, [ConstantForce()])
-    information, score = blocks.total()
-    free, own = blocks.rows(response.free), len(blocks.names) - 1
+    information, score = (part.copy() for part in blocks.total())
+    own = len(blocks.names) - 1
+    # while a fit is poor, the priors weigh more (see `FreeFits`)
+    information[np.arange(own), np.arange(own)] += (heat - 1) * response.prior
+    score[:own] += (heat - 1) * response.pull
+    rows = blocks.rows(response.free)
+    free = rows[rows < own]
+    (row,) = blocks.rows([strength.name])
     top = gain(information, score, free)
 
-    def tried(form: Primitive, force: float) -> OneDirection:
+    def tried(form: Primitive, sense: float) -> OneDirection:
         step = np.zeros(len(blocks.names))
-        step[own] = force / blocks.scale[own]
+        step[own] = sense * value / blocks.scale[own]
         lost = float(step @ information @ step - 2 * step @ score)
-        moved = score - information @ step
-        worse = top + lost - gain(information, moved, free)
-        shift, _ = newton_step(information, moved, free)
+        # the constant force remains as large as the friction
+        tied = np.eye(len(blocks.names))
+        tied[own, row] = sense * blocks.scale[row] / blocks.scale[own]
+        squares, slope = (
+            tied.T @ information @ tied,
+            tied.T @ (score - information @ step),
+        )
+        worse = (top + lost - gain(squares, slope, free)) / heat
+        shift, covariance = newton_step(squares, slope, free)
         pull = response.prior[free] * shift**2
+        if not np.any(pull):
+            pull = shift**2 / np.diag(covariance)
         hidden = blocks.names[free[int(np.argmax(pull))]]
-        return OneDirection(form, 2 * force, worse / heat_of(best.fit), hidden)
+        return OneDirection(form, 2 * sense * value, worse, hidden)
 
     # with Coulomb friction, a constant force vanishes in one direction
-    found = [tried(FORWARD, -friction), tried(BACKWARD, friction)]
+    found = [tried(FORWARD, -1.0), tried(BACKWARD, 1.0)]
     return min(found, key=lambda one: one.worse)
 
 

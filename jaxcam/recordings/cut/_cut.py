@@ -75,8 +75,8 @@ def cut(
             for place, number in marks.items()
             if place in before and place in after
         }
-        # a velocity jump while the motion leaves the surface is not an impact on it,
-        # unless a model of the flight contradicts the polynomials fitted here
+        # a velocity jump while the motion leaves the surface is not an impact on it; a
+        # mark in a doubted stretch is kept, because a model contradicts the polynomials
         long = {last for first, last in spans if last - first >= _LONG}
         wrong = [
             place
