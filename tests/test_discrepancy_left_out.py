@@ -45,8 +45,11 @@ def test_functions_that_explain_most_of_the_rest_are_kept(
     search.policy = Policy()
     search.fits = types.SimpleNamespace(policy=Policy())
     fewer, whole = _found(["a"], left), _found(["a", "b"], rest)
-    assert search._lacks(fewer, whole) is needed
-    assert not search._lacks(whole, whole)
+    assert search._lacks(fewer, fewer, whole) is needed
+    assert not search._lacks(whole, whole, whole)
+    # a formula that consists of a term and a form does not replace another function
+    both = _found(["a", "c"], left)
+    assert search._lacks(fewer, both, whole) is needed
 
 
 def test_a_function_that_explains_much_is_not_fitted_without(

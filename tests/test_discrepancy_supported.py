@@ -40,7 +40,10 @@ def test_a_doubtful_term_that_explains_little_is_not_named(monkeypatch, lost):
     for name, function in replaced.items():
         monkeypatch.setattr(_supported, name, function)
     fits: Any = SimpleNamespace(
-        policy=Policy(), progress=lambda *args: None, known={frozenset(): before}
+        policy=Policy(),
+        progress=lambda *args: None,
+        known={frozenset(): before},
+        terms=(),
     )
     question: Any = None
     named = _supported.supported(question, fits, found, 0)
