@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 from benchmarks._made_rigs import made_rig
 from benchmarks.named import hidden_case as named_case
 from benchmarks.unnamed import hidden_case, judged
-from jaxcam.discrepancy import diagnose
-from jaxcam.discrepancy.report._caveats import _in_one_direction
+from jaxcam.discrepancy import diagnose, Policy
+from jaxcam.discrepancy.report._direction import in_both_directions, in_one_direction
 from jaxcam.discrepancy.search import _one_direction, one_direction, OneDirection
 from jaxcam.discrepancy.search._named_parts import friction_named, without_friction
 from jaxcam.discrepancy.terms import (
@@ -110,6 +110,22 @@ def test_the_change_in_cost_is_that_of_a_constant_force_as_large_as_the_friction
     assert found.hidden == "k"
 
 
+def test_one_direction_is_preferred_only_if_that_is_seldom_wrong():
+    """With Coulomb friction and the least favourable accuracy of a constant force, in
+    at most 10 % of the cases (to 0.5 %)."""
+    policy, rng = Policy(), np.random.default_rng(3)
+    limit = max(
+        one
+        for one in np.linspace(-5, 0, 5001).tolist()
+        if OneDirection(FORWARD, -1.0, one, "k").preferred(policy)
+    )
+    wrong = []
+    for ratio in (0.3, 1.0, 1.28, 2.0, 4.0):
+        worse = ratio**2 + 2 * ratio * rng.standard_normal(40_000)
+        wrong.append(np.mean(worse < limit))
+    assert max(wrong) == pytest.approx(1 - policy.confidence, abs=5e-3)
+
+
 def test_a_fit_without_coulomb_friction_has_no_direction(monkeypatch, unchecked_types):
     """Or with a constant force, which the fit then contains already, or if the friction
     acts on another coordinate."""
@@ -200,6 +216,9 @@ def test_friction_is_named_only_beside_a_force_by_velocity_in_flight(unchecked_t
 @pytest.mark.parametrize(("size", "when"), [(-0.6, "positive"), (0.6, "negative")])
 def test_the_caveat_states_the_direction_and_what_to_measure(size, when):
     form = FORWARD if size < 0 else BACKWARD
-    caveat = _in_one_direction(OneDirection(form, size, 1.0, "spring_elongation"))
-    assert f"only at {when} velocities" in caveat.sentence
-    assert "measure spring elongation more accurately" in caveat.sentence
+    direction = OneDirection(form, size, 1.0, "spring_elongation")
+    caveats = in_one_direction(direction), in_both_directions(direction)
+    assert f"only at {when} velocities" in caveats[0].sentence
+    assert "Coulomb friction of half the size" in caveats[1].sentence
+    for caveat in caveats:
+        assert "measure spring elongation more accurately" in caveat.sentence

@@ -81,7 +81,7 @@ def choose(
     separate = _separate_values(trials, named, textbook)
     functions, useless, predicted = Unnamed(), None, None
     instead = named.direction
-    if instead is not None and instead.worse > -policy.tie:
+    if instead is not None and not instead.preferred(policy):
         instead = None
     sought = (named.left or instead is not None) and not separate.settled
     if sought and unnamed and policy.functions:

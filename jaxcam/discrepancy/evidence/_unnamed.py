@@ -126,8 +126,7 @@ def without_a_name(
         known = in_one_direction(search, offered, best, instead)
         if tolerable or not search.falls_short(known):
             rank_decoys(search, known)
-            least = best.bic - policy.tie
-            found, its = _needed(search, known, least, seed, by_chance)
+            found, its = _needed(search, known, best.bic, seed, by_chance)
             if found is not None or tolerable:
                 return Unnamed(found, its, by_chance=tuple(by_chance))
     # elements with an internal state are tried only if functions may not suffice

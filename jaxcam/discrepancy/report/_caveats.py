@@ -13,9 +13,9 @@ from ..evidence import (
     rms_of,
 )
 from ..policy import Policy
-from ..search import OneDirection, Question, Shuffled, Trial, Trials
-from ..terms import CoulombFriction
+from ..search import Question, Shuffled, Trial, Trials
 from ._caveat import Caveat, Reason
+from ._direction import in_one_direction
 from ._words import listed, number, percent, quantity, ratio, spelled
 
 
@@ -43,7 +43,7 @@ def caveats_of(
         yield _tie(choice.named.best, trial)
     direction = choice.named.direction
     if direction is not None and direction.worse <= trials.policy.tie:
-        yield _in_one_direction(direction)
+        yield in_one_direction(direction)
     apart = not_shared(choice, trials.policy)
     if apart and not (choice.differing is not None and choice.differing.complete):
         yield Caveat(
@@ -56,18 +56,6 @@ def caveats_of(
         yield differs(choice.differing, trials.policy)
     if choice.held.after > trials.policy.as_noise:
         yield above_noise(choice.held, named)
-
-
-def _in_one_direction(direction: OneDirection) -> Caveat:
-    when = "positive" if direction.size < 0 else "negative"
-    return Caveat(
-        Reason.TIE,
-        f"Dry friction that acts only at {when} velocities would explain the data at "
-        "least as well as Coulomb friction does, because the rig parameters can "
-        "represent a constant force. To tell the two apart, measure "
-        f"{spelled(direction.hidden)} more accurately.",
-        (CoulombFriction.name,),
-    )
 
 
 def differs(found: Differing, policy: Policy, called: str = "") -> Caveat:

@@ -41,6 +41,7 @@ from ._caveats import (
 )
 from ._close_forms import close_forms
 from ._diagnosis import Diagnosis, Verdict
+from ._direction import in_both_directions
 from ._effects import (
     drive_effect,
     missing_effects,
@@ -223,6 +224,11 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     for rival in choice.unnamed.rivals:
         if rival.share > 1 - policy.confidence:
             yield functions_tie(rival_name(rival), rival)
+    direction = choice.named.direction
+    forms = [part.form for part in missing.functions]
+    if direction is not None and direction.form.name in forms:
+        if not missing.names and direction.worse >= -policy.tie:
+            yield in_both_directions(direction)
     share = max((share for _, share in missing.decoys), default=0.0)
     if share > policy.decoy:
         yield decoy_explains(share)

@@ -10,7 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
+from ..policy import Policy
 from ..terms import (
     BACKWARD,
     ConstantForce,
@@ -45,6 +47,17 @@ class OneDirection(NamedTuple):
     size: float
     worse: float
     hidden: str
+
+    def preferred(self, policy: Policy) -> bool:
+        """Return whether the recordings favour friction in one direction so much that
+        this is wrong with a probability of at most `1 - policy.confidence`, whatever
+        the parameters of the rig say about a constant force.
+
+        With Coulomb friction, `worse` has a normal distribution with mean `r**2` and
+        standard deviation `2*r`, where `r` is the ratio of the friction to the error of
+        a constant force.
+        """
+        return self.worse < -(float(norm.ppf(policy.confidence)) ** 2)
 
 
 def one_direction(trials: Trials, best: Trial) -> OneDirection | None:
