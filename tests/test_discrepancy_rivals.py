@@ -47,10 +47,10 @@ def test_a_decoy_acts_in_the_reverse_order_of_time():
 
 def test_a_knockoff_acts_at_other_moments_of_its_recording():
     """At least a tenth of the recording away, counted around its ends; padding is left
-    as it is, and two knockoffs differ."""
-    exists = np.array([[True] * 40, [True, False] * 20])
+    as it is, also in a recording without flights, and two knockoffs differ."""
+    exists = np.array([[True] * 40, [True, False] * 20, [False] * 40])
     response = Response(*([None] * len(Response._fields)))._replace(exists=exists)
-    forces = np.arange(2 * 40 * 5, dtype=float).reshape(2, 40, 5, 1)
+    forces = np.arange(3 * 40 * 5, dtype=float).reshape(3, 40, 5, 1)
     rng = np.random.default_rng(3)
     one, other = (_at_other_moments(response, forces, rng) for _ in range(2))
     assert np.any(one != other)

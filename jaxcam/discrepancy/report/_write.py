@@ -15,7 +15,7 @@ from ..evidence import (
     visited_states,
 )
 from ..policy import Policy
-from ..search import Missing, Question, Trials
+from ..search import Free, Missing, Question, Trials
 from ..terms import Value, watching
 from ._alternatives import (
     alternatives_of,
@@ -225,7 +225,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
         if rival.share > 1 - policy.confidence:
             yield functions_tie(rival_name(rival), rival)
     direction = choice.named.direction
-    forms = [part.form for part in missing.functions]
+    forms = [part.form for part in missing.functions if isinstance(part, Free)]
     if direction is not None and direction.form.name in forms:
         if not missing.names and direction.worse >= -policy.tie:
             yield in_both_directions(direction)

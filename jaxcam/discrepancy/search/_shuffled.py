@@ -120,6 +120,9 @@ def _at_other_moments(
     found = forces.copy()
     for row, exists in enumerate(response.exists):
         rows = np.flatnonzero(exists)
+        if not len(rows):
+            # a recording without flights
+            continue
         every = forces[row, rows]
         flat = every.reshape(-1, every.shape[-1])
         found[row, rows] = flat[_moments(len(flat), rng)].reshape(every.shape)
