@@ -7,21 +7,20 @@ import numpy as np
 
 from benchmarks import _cam_with_effects
 from benchmarks._hidden_physics import Effect, Hidden
+from benchmarks._numba_rig import Samples
 from benchmarks._own_rig_makers import made_case, MAKERS, Motion
 from benchmarks._verdicts import SETTLE
-from benchmarks.coverage import measure, random_rig
+from benchmarks.coverage import random_rig, recording
+from benchmarks.fresh import DURATION as CAM_DURATION, SPANS_RPM
 from benchmarks.own_rigs import drawn, RIGS
 from jaxcam.data import DEMO_RIG
 from jaxcam.fitting import read_setup
 from jaxcam.recordings import read_rig, Recording
 
 
-DURATION = 6.0
+_DURATION, _INTERVAL = 6.0, 5e-4
 _CAM = "cam_follower"
 NAMES = (_CAM, *sorted(MAKERS))
-# Ranges from which the speed of each record of the cam-follower is drawn (rpm)
-_SPANS_RPM = ((128, 140), (140, 148), (141, 149), (150, 158), (158, 173), (160, 178))
-_INTERVAL, _CAM_DURATION = 5e-4, 4.0
 
 
 class MadeRig(NamedTuple):
@@ -40,7 +39,7 @@ class MadeRig(NamedTuple):
 
     @property
     def duration(self) -> float:
-        return _CAM_DURATION if self.name == _CAM else DURATION
+        return CAM_DURATION if self.name == _CAM else _DURATION
 
     def admits(self, effect: Effect) -> bool:
         """Whether the rig has what an effect depends on."""
@@ -63,34 +62,25 @@ class MadeRig(NamedTuple):
         if self.name == _CAM:
             return [
                 self._cam_record(truth, rng, hidden, f"run{run}", span)
-                for run, span in enumerate(_SPANS_RPM, start=1)
+                for run, span in enumerate(SPANS_RPM, start=1)
             ]
-        return made_case(self.name, self.given, truth, rng, hidden, DURATION)
+        return made_case(self.name, self.given, truth, rng, hidden, _DURATION)
 
     def _cam_record(self, truth, rng, hidden, name: str, span):
-        sensors = self.given.sensors
         speed = rng.uniform(*span) * math.pi / 30
         rows, struck = _cam_with_effects.run(
-            truth, hidden, speed, _CAM_DURATION, SETTLE, _INTERVAL
+            truth, hidden, speed, CAM_DURATION, SETTLE, _INTERVAL
         )
         turned, angle, velocity = rows.T
         time = _INTERVAL * np.arange(len(rows))
         shown = angle
         if hidden is not None and hidden.effect.kind == "sensor":
             shown = angle + hidden.at(angle, velocity, turned, time)
-        whole = 2 * np.pi * np.floor(turned[0] / (2 * np.pi))
-        channels = {
-            "cam_angle_rad": measure(
-                turned - whole, sensors.cam_noise, sensors.cam_counts_per_turn, rng
-            ),
-            "follower_angle_rad": measure(
-                shown, sensors.follower_noise, sensors.follower_counts_per_turn, rng
-            ),
-        }
         states = np.stack([angle, velocity], axis=1)
         hertz = speed / (2 * math.pi)
         motion = Motion(time, states, turned, hertz, struck)
-        return Recording(name, time, channels), motion
+        samples = Samples(time, turned, shown)
+        return recording(samples, self.given.sensors, name, rng), motion
 
 
 def made_rig(name: str) -> MadeRig:

@@ -1,5 +1,5 @@
-"""Test whether named effects are recognised in user-defined rigs, alone and together
-with an effect without a name.
+"""Test whether named effects are recognised, alone and together with an effect without
+a name.
 
 The cases are made as those of `benchmarks.unnamed`, with an effect of the library
 instead, or in addition. A verdict is correct if it names this effect alone, with a

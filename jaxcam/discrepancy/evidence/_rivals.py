@@ -41,6 +41,8 @@ def rivals(
     for one in ranked:
         # the choice with an additional part is no alternative: that part was left out
         nested = _parts(found) <= _parts(one)
+        # a function whose parts were named is no alternative to them
+        nested |= _parts(one) < _parts(found) and one.score < found.score
         if not nested and all(_parts(one) != _parts(other) for other in kept):
             kept.append(one)
     kept = kept[: policy.alternatives]

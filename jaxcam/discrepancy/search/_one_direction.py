@@ -53,11 +53,13 @@ class OneDirection(NamedTuple):
         this is wrong with a probability of at most `1 - policy.confidence`, whatever
         the parameters of the rig say about a constant force.
 
-        With Coulomb friction, `worse` has a normal distribution with mean `r**2` and
-        standard deviation `2*r`, where `r` is the ratio of the friction to the error of
-        a constant force.
+        With Coulomb friction, the change in cost for a direction has a normal
+        distribution with mean `r**2` and standard deviation `2*r`, where `r` is the
+        ratio of the friction to the error of a constant force. Each of the two
+        directions may be wrong.
         """
-        return self.worse < -(float(norm.ppf(policy.confidence)) ** 2)
+        least = float(norm.isf((1 - policy.confidence) / 2))
+        return self.worse < -(least**2)
 
 
 def one_direction(trials: Trials, best: Trial) -> OneDirection | None:
