@@ -10,7 +10,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
+
+from benchmarks._optional_numba import register_jitable
 
 
 class Effect(NamedTuple):

@@ -24,8 +24,9 @@ from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import diagnose, Diagnosis
 from jaxcam.recordings import read_rig, Recording
 
+from ._hidden_records import hidden_records
 from ._numba_rig import Hidden
-from ._verdicts import close, hidden_records, Kept
+from ._verdicts import close, Kept
 from .coverage import random_rig
 
 

@@ -16,10 +16,10 @@ import math
 import time
 
 import numpy as np
-from numba.extending import register_jitable
 
 from benchmarks._hidden_physics import direction, Effect, EFFECTS, Hidden, Scales
 from benchmarks._made_rigs import made_rig, MadeRig, NAMES
+from benchmarks._optional_numba import register_jitable
 from benchmarks._own_rig_makers import Accumulates
 from benchmarks._verdicts import close
 from benchmarks.unnamed import function_off, scales_of

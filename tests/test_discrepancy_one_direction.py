@@ -143,6 +143,7 @@ def test_a_fit_without_coulomb_friction_has_no_direction(monkeypatch, unchecked_
 def test_friction_in_one_direction_is_not_named_coulomb_friction():
     """The rig can represent the constant force by which they differ, but not within
     its tolerances; the size of the friction to 0.1 %."""
+    pytest.importorskip("numba")
     rig = made_rig("cam_follower")
     hidden, runs, motions, _ = hidden_case(rig, "one_way", 4801)
     found = diagnose(rig.given, runs)
@@ -156,6 +157,7 @@ def test_friction_in_one_direction_is_not_named_coulomb_friction():
 
 @pytest.mark.slow
 def test_coulomb_friction_is_not_explained_by_one_direction():
+    pytest.importorskip("numba")
     rig = made_rig("cam_follower")
     _, _, runs, _ = named_case(rig, "coulomb_friction", None, 4801)
     found = diagnose(rig.given, runs)

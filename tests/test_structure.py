@@ -2,6 +2,8 @@
 
 import ast
 import graphlib
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -183,3 +185,22 @@ def test_no_file_needs_itself(room):
     except graphlib.CycleError as found:
         circle = [str(f.relative_to(ROOT)) for f in found.args[1]]
         pytest.fail(f"a circle of imports: {circle}")
+
+
+def test_tests_import_no_benchmark_that_needs_numba():
+    """The extra `test` does not install it, whatever this environment has."""
+    modules = sorted(
+        {
+            module
+            for file in (ROOT / "tests").glob("*.py")
+            for module in _imports(file)
+            if module.startswith("benchmarks.")
+        }
+    )
+    assert "benchmarks.named" in modules
+    code = "import sys; sys.modules['numba'] = None\n"
+    code += "\n".join(f"import {module}" for module in modules)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
