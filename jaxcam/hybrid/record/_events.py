@@ -99,7 +99,9 @@ class Switches(Printed):
     """The events at switching surfaces, in order; padded like `Impacts`.
 
     An impact that ends sliding, because it moves the state off the surface, is listed
-    only among the impacts.
+    only among the impacts. If sliding begins or ends on several surfaces at the same
+    instant, as under two feet of a rigid body, only one of them is listed;
+    `Steps.sides` contains all.
     """
 
     time: Float[AnyArray, " k"]
