@@ -310,3 +310,13 @@ def test_a_fit_that_fails_with_a_new_smoothness_does_not_replace_the_one_before(
     subset = Subset(problem, ("first",), frozenset())  # pyright: ignore
     found = Planned((), (), POLICY).fitted(subset, None, beaten=120.0)  # pyright: ignore
     assert (found.functions, found.score) == (("first",), 105.0)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+@pytest.mark.parametrize("cost", [np.inf, np.nan])
+def test_a_failed_fit_has_an_infinite_score(cost):
+    """Its cost per sample scales no tolerance."""
+    failed = SimpleNamespace(cost=cost, problem=SimpleNamespace(samples=100))
+    smooth = SimpleNamespace(price=lambda samples: 0.0, smooth=True)
+    subset = Subset(failed.problem, (smooth,), frozenset())  # pyright: ignore
+    assert FreeFits((), (), POLICY).score(subset, failed) == np.inf  # pyright: ignore

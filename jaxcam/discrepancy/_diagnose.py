@@ -14,7 +14,7 @@ from ..recordings import Recording, Rig, Segments
 from ._elsewhere import falls_short, sought_elsewhere
 from ._lagging import long_lag, more_accurate
 from ._mappings import make_room
-from ._set_aside import odd_record, set_aside
+from ._set_aside import elsewhere, odd_record, set_aside
 from .evidence import Choice, choose, ripple_of, whole_flights
 from .policy import Policy
 from .report import Diagnosis, diagnosis_of
@@ -272,7 +272,8 @@ def _answered(
     bare, rough = trials.known[frozenset()], None
     far = model_errors_dominate(bare.fit, best.fit, policy)
     # an odd recording is no missing physics: the diagnosis is repeated without it
-    odd = odd_record(best.fit, policy) is not None
+    name = odd_record(best.fit, policy)
+    odd = name is not None and not elsewhere(question.problem, name, policy)
     if far and not odd:
         rough = _roughly(question, bare, keep, conditions, earlier)
     if rough is not None and not rough.choice.explained(policy):

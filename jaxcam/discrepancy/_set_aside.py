@@ -8,9 +8,9 @@ import dataclasses
 
 import numpy as np
 
-from ..fitting import Fit
+from ..fitting import Fit, Problem
 from .policy import Policy
-from .report import Caveat, Diagnosis, Reason
+from .report import Caveat, Diagnosis, Reason, Verdict
 
 
 def odd_record(found: Fit, policy: Policy) -> str | None:
@@ -44,8 +44,34 @@ def cost_by_record(found: Fit) -> dict[str, float]:
     return dict(zip(problem.records, (total / samples).tolist()))
 
 
+def elsewhere(problem: Problem, name: str, policy: Policy) -> bool:
+    """Return whether a recording visits states that no other recording visits.
+
+    Missing physics may then act in this recording only. At least a fraction
+    `policy.odd_share` of the samples of one of its channels must lie outside the range
+    of this channel in the other recordings.
+    """
+    runs = [part.recording for part in problem.segments]
+    (odd,) = [run for run in runs if run.name == name]
+    others = [run for run in runs if run is not odd]
+    for channel in problem.model.sensors:
+        if channel not in odd.channels:
+            continue
+        known = [run[channel] for run in others if channel in run.channels]
+        if not known:
+            continue
+        seen, its = np.concatenate(known), odd[channel]
+        outside = (its < np.nanmin(seen)) | (its > np.nanmax(seen))
+        if np.mean(outside) >= policy.odd_share:
+            return True
+    return False
+
+
 def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     """Return the diagnosis of the other recordings, if it explains them better.
+
+    If nothing is missing in the others, physics may be missing in states that only the
+    inconsistent recording visits; the diagnosis of all recordings is then returned.
 
     **Arguments:** the diagnosis of all recordings, the one without the inconsistent
     recording, and its name.
@@ -54,6 +80,9 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     better = (
         max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd_ratio
     )
+    there = elsewhere(found.after.problem, name, found.policy)
+    if there and again.verdict is Verdict.NONE:
+        better = False
     chosen = again if better else found
     done = "is excluded" if better else "is not explained by any of the terms tried"
     sentence = (
@@ -63,5 +92,10 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
         f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. Check how "
         f"{name} was recorded and read."
     )
+    if there:
+        sentence += (
+            f" Parts of {name} are outside the range of the other recordings; physics "
+            "may be missing that acts only there."
+        )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

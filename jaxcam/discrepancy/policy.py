@@ -93,8 +93,7 @@ class Policy:
     )
     half_information: float = decides(
         1e-3,
-        "minimum fraction of the information on a term that one half of the recordings "
-        "must contain for the term to be estimated from it",
+        "fraction of the information on a term that a half of the recordings needs",
     )
     stretches: int = decides(4, "maximum number of bootstrap blocks per recording")
     stretch_pieces: int = decides(
@@ -118,8 +117,7 @@ class Policy:
         0.005, "fraction of velocities excluded at each end of the range of a function"
     )
     drive_wander: float = decides(
-        0.75,
-        "multiple of the rotation frequency below which speed changes count as drift",
+        0.75, "speed changes below this multiple of the rotation frequency are drift"
     )
     drive_degree: int = decides(
         5, "degree of the polynomial for speed drift near the ends of a recording"
@@ -132,6 +130,11 @@ class Policy:
         10.0,
         "a recording is excluded if its cost per sample is at least this many times "
         "that of any other recording",
+    )
+    odd_share: float = decides(
+        0.05,
+        "fraction of its samples outside the range of the other recordings at which a "
+        "recording may contain physics that acts only there",
     )
     records_apart: int = decides(
         4, "minimum number of recordings from which one may be excluded"
@@ -311,23 +314,19 @@ class Policy:
         0.5, "fraction of a function's gain that its decoy may explain without a caveat"
     )
     units_doubted: float = shows(
-        1000.0,
-        "ratio of rms residual to noise above which a caveat questions the units",
+        1000.0, "ratio of rms residual to noise above which the units are doubted"
     )
     moved_errors: float = shows(
         3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
     rival: float = shows(
-        30.0,
-        "difference in BIC below which the recommended recording should separate an "
-        "alternative from the named terms",
+        30.0, "difference in BIC up to which the next recording must rule out a rival"
     )
     absent_errors: float = shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"
     )
     nearby: float = shows(
-        0.03,
-        "distance, as a fraction of the range, within which data count as near a point",
+        0.03, "fraction of the range within which data count as near a point"
     )
     visited: float = shows(
         0.1, "minimum data density, relative to a uniform density, to show a function"

@@ -259,7 +259,9 @@ class FreeFits:
         return prices
 
     def score(self, subset: Subset, found: Fit) -> float:
-        """Return minus twice the logarithm of the evidence, up to a constant."""
+        """Return minus twice the log-evidence, infinite if the fit has failed."""
+        if not math.isfinite(found.cost):
+            return math.inf
         count = sum(len(t.strengths()) for t in self.terms if t.name in subset.names)
         samples = found.problem.samples
         price = count * math.log(samples)
