@@ -2,6 +2,8 @@
 flat: the friction of each foot is indeterminate, the motion is not.
 """
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -13,18 +15,23 @@ from jaxcam.hybrid import SwitchedSystem
 GRAVITY = 9.81
 
 
+def _number(value) -> jax.Array:
+    """A field that is an array, so that one program serves all values."""
+    return eqx.field(converter=jnp.asarray, default=value)
+
+
 class Box(SwitchedSystem):
     """Position of the centre and angle, and their rates; unit mass."""
 
-    mu: float = 0.3
-    restitution: float = 0.4
-    half_width: float = 0.5
-    height: float = 0.2
-    inertia: float = 0.1
-    order: float = 1.0  # -1 exchanges the feet
-    amplitude: float = 0.0
-    omega: float = 3.0
-    incline: float = 0.0
+    mu: jax.Array = _number(0.3)
+    restitution: jax.Array = _number(0.4)
+    half_width: jax.Array = _number(0.5)
+    height: jax.Array = _number(0.2)
+    inertia: jax.Array = _number(0.1)
+    order: jax.Array = _number(1.0)  # -1 exchanges the feet
+    amplitude: jax.Array = _number(0.0)
+    omega: jax.Array = _number(3.0)
+    incline: jax.Array = _number(0.0)
 
     def _feet(self, state):
         c, s = jnp.cos(state[2]), jnp.sin(state[2])
@@ -63,9 +70,9 @@ class Box(SwitchedSystem):
 class Block(SwitchedSystem):
     """The same body without rotation: position and velocity."""
 
-    mu: float = 0.3
-    amplitude: float = 0.0
-    omega: float = 3.0
+    mu: jax.Array = _number(0.3)
+    amplitude: jax.Array = _number(0.0)
+    omega: jax.Array = _number(3.0)
 
     def switching(self, t, state):
         return state[1]
