@@ -1,4 +1,7 @@
-"""Records of a rig with a hidden effect, made by the scalar loop of `_numba_rig`."""
+"""Records of a rig with a hidden effect, made by the scalar loop of `_numba_rig`.
+
+Needs numba (extra `bench`).
+"""
 
 import math
 

@@ -7,73 +7,130 @@ import numpy as np
 import pytest
 
 from jaxcam.discrepancy import _set_aside, Policy, Verdict
-from jaxcam.discrepancy._set_aside import elsewhere, set_aside
+from jaxcam.discrepancy._set_aside import (
+    not_set_aside,
+    set_aside,
+    visits_own_states,
+)
 from jaxcam.discrepancy.report import Reason
-from jaxcam.recordings import Recording
+from jaxcam.discrepancy.search._question import check_runs
+from jaxcam.recordings import Recording, RecordingError
 
 
-_TIME = np.linspace(0.0, 1.0, 101)
+_TIME = np.linspace(0.0, 1.0, 401)
+
+
+def _problem(own, *, filled=None, channel="angle_rad", speed=1.0, approach=()):
+    """Four recordings of a sine, and one with other samples in one channel.
+
+    **Arguments:** `speed`: size of the velocities of the last recording, relative to
+    those of the others; `approach`: its approach speeds.
+    """
+    wave = np.sin(30 * _TIME)
+    runs = [
+        Recording(f"run{k}", _TIME, {"angle_rad": size * wave})
+        for k, size in enumerate((1.0, 0.9, 1.0, 0.8), start=1)
+    ]
+    runs.append(Recording("run5", _TIME, {channel: own}, filled=filled))
+    states = np.stack([wave[::10], np.cos(30 * _TIME[::10])], axis=1)
+    slow = SimpleNamespace(approach=np.array([0.1, 0.2]))
+    own_impacts = SimpleNamespace(approach=np.array(approach))
+    return SimpleNamespace(
+        records=tuple(run.name for run in runs),
+        segments=[
+            SimpleNamespace(recording=run, impacts=own_impacts if k == 4 else slow)
+            for k, run in enumerate(runs)
+        ],
+        model=SimpleNamespace(sensors={"angle_rad": None}),
+        pieces=SimpleNamespace(exists=np.ones((5, len(states)), dtype=bool)),
+        start=SimpleNamespace(states=np.stack([states] * 4 + [states * [1.0, speed]])),
+    )
+
+
+_WAVE = np.sin(30 * _TIME)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+@pytest.mark.parametrize(
+    ("given", "alone"),
+    [
+        ({"own": 0.95 * _WAVE}, False),
+        # within a margin of 3 % of the range, of two units
+        ({"own": 1.04 * _WAVE}, False),
+        ({"own": 2.0 * _WAVE}, True),
+        # one sample in a hundred
+        ({"own": np.where(np.arange(401) % 100 == 0, 5.0, _WAVE)}, False),
+        ({"own": np.where(np.arange(401) % 10 == 0, 5.0, _WAVE)}, True),
+        ({"own": _WAVE, "speed": 10.0}, True),
+        ({"own": _WAVE, "approach": (0.15, 0.9)}, True),
+        ({"own": _WAVE, "approach": (0.15, 0.18)}, False),
+        # samples that were not measured do not count, neither among those inside
+        ({"own": 2.0 * _WAVE, "filled": np.ones(401, dtype=bool)}, False),
+        ({"own": np.where(np.arange(401) < 380, np.nan, 5.0)}, True),
+        ({"own": 2.0 * _WAVE, "channel": "not_modelled"}, False),
+    ],
+)
+def test_a_recording_visits_states_of_its_own(given, alone):
+    problem = _problem(**given)
+    assert visits_own_states(problem, "run5", Policy()) is alone  # pyright: ignore
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_a_spike_in_another_recording_hides_no_states():
+    problem = _problem(2.0 * _WAVE)
+    problem.segments[0].recording["angle_rad"][7] = 50.0
+    assert visits_own_states(problem, "run5", Policy())  # pyright: ignore
 
 
 @dataclasses.dataclass
 class _Found:
-    """What `set_aside` reads of a diagnosis."""
+    """What is read of a diagnosis."""
 
     verdict: Verdict
-    after: SimpleNamespace
-    policy: Policy = Policy()
     caveats: tuple = ()
 
 
-def _problem(largest, channels=("angle_rad",)):
-    """Four recordings of a sine of one unit, and one with another largest value."""
-    sizes = (1.0, 0.9, 1.0, 0.8, largest)
-    runs = [
-        Recording(f"run{k}", _TIME, {"angle_rad": size * np.sin(6 * _TIME)})
-        for k, size in enumerate(sizes, start=1)
-    ]
-    return SimpleNamespace(
-        segments=[SimpleNamespace(recording=run) for run in runs],
-        model=SimpleNamespace(sensors=dict.fromkeys(channels)),
-    )
-
-
 @pytest.mark.usefixtures("unchecked_types")
 @pytest.mark.parametrize(
-    ("largest", "there"), [(0.95, False), (1.0, False), (2.0, True)]
+    ("short", "said"),
+    [(False, "What is missing acts in"), (True, "unidentified physics acts in")],
 )
-def test_a_recording_beyond_the_range_of_the_others(largest, there):
-    """Two thirds of the samples of a sine of twice the size are beyond one unit."""
-    assert elsewhere(_problem(largest), "run5", Policy()) is there  # pyright: ignore
-
-
-@pytest.mark.usefixtures("unchecked_types")
-def test_channels_that_are_not_modelled_do_not_count():
-    problem = _problem(2.0, channels=("speed_rad_s",))
-    assert not elsewhere(problem, "run5", Policy())  # pyright: ignore
-
-
-@pytest.mark.usefixtures("unchecked_types")
-@pytest.mark.parametrize(
-    ("largest", "verdict", "kept"),
-    [
-        (1.0, Verdict.NONE, Verdict.NONE),
-        (1.0, Verdict.EFFECT, Verdict.EFFECT),
-        # the exception may contain the physics
-        (2.0, Verdict.NONE, Verdict.UNKNOWN),
-        (2.0, Verdict.EFFECT, Verdict.EFFECT),
-    ],
-)
-def test_which_diagnosis_is_reported(monkeypatch, largest, verdict, kept):
-    """`verdict` is that of the others, and the verdict on all recordings is unknown."""
-    costs = {f"run{k}": 1.0 for k in range(1, 5)}
-    every = SimpleNamespace(costs={**costs, "run5": 100.0}, problem=_problem(largest))
-    others = SimpleNamespace(costs=costs)
-    monkeypatch.setattr(_set_aside, "cost_by_record", lambda found: found.costs)
-    found, again = _Found(Verdict.UNKNOWN, every), _Found(verdict, others)
-    chosen = set_aside(found, again, "run5")  # pyright: ignore
-    assert chosen.verdict is kept
-    (caveat,) = chosen.caveats
+def test_a_result_that_rests_on_one_recording_has_a_caveat(monkeypatch, short, said):
+    monkeypatch.setattr(_set_aside, "falls_short", lambda found: short)
+    found = not_set_aside(_Found(Verdict.UNKNOWN), "run5")  # pyright: ignore
+    (caveat,) = found.caveats
     assert caveat.reason is Reason.SET_ASIDE
-    assert ("run5 is excluded" in caveat.sentence) is (chosen.verdict is verdict)
-    assert ("outside the range" in caveat.sentence) is (largest > 1.0)
+    assert "Without the recording run5, nothing is missing" in caveat.sentence
+    assert said in caveat.sentence
+
+
+@pytest.mark.usefixtures("unchecked_types")
+@pytest.mark.parametrize(("left", "excluded"), [(1.0, True), (50.0, False)])
+def test_a_recording_is_excluded_if_the_others_are_explained(
+    monkeypatch, left, excluded
+):
+    """`left`: the cost per sample of the worst of the others."""
+    costs = {f"run{k}": 1.0 for k in range(1, 5)}
+    monkeypatch.setattr(_set_aside, "cost_by_record", lambda found: found)
+    found, again = (
+        SimpleNamespace(verdict=verdict, after=after, caveats=(), policy=Policy())
+        for verdict, after in (
+            (Verdict.UNKNOWN, {**costs, "run5": 100.0}),
+            (Verdict.EFFECT, {**costs, "run1": left}),
+        )
+    )
+    monkeypatch.setattr(
+        _set_aside.dataclasses,
+        "replace",
+        lambda one, **changes: SimpleNamespace(**{**vars(one), **changes}),
+    )
+    chosen = set_aside(found, again, "run5")  # pyright: ignore
+    assert chosen.verdict is (Verdict.EFFECT if excluded else Verdict.UNKNOWN)
+    (caveat,) = chosen.caveats
+    assert ("run5 is excluded" in caveat.sentence) is excluded
+
+
+def test_recordings_of_the_same_name_are_refused():
+    runs = [Recording("run", _TIME, {"angle_rad": _WAVE})] * 2
+    with pytest.raises(RecordingError, match="More than one recording is called 'run'"):
+        check_runs(runs)

@@ -177,6 +177,26 @@ def test_one_misread_record_does_not_hide_the_answer():
 
 
 @pytest.mark.slow
+def test_a_misread_record_outside_the_range_of_the_others():
+    """With an offset of 0.2. It is excluded if drag acts in the others; if nothing is
+    missing in them, the verdict is unknown, and the record is questioned.
+    """
+    starts = (0.3, 0.25, 0.2, 0.35, 0.28)
+    motions = [_sailing(x, 0.3) for x in starts]
+    found = _diagnosed([*motions, motions[3] + 0.2], candidates=(Sail(),))
+    assert found.names == ("sail",) and "run5" not in found.records
+    one = found.effects[0].parameters["drag"]
+    assert one.value == pytest.approx(0.3, abs=4 * one.stderr)
+    (aside,) = [c for c in found.caveats if c.reason is Reason.SET_ASIDE]
+    assert "run5 is excluded" in aside.sentence
+    motions = [_free(x, 0.1) for x in starts]
+    found = _diagnosed([*motions, motions[3] + 0.2], candidates=(Sail(),))
+    assert found.verdict is Verdict.UNKNOWN
+    (aside,) = [c for c in found.caveats if c.reason is Reason.SET_ASIDE]
+    assert "Without the recording run5, nothing is missing." in aside.sentence
+
+
+@pytest.mark.slow
 def test_a_candidate_that_cannot_be_fitted_hides_no_other():
     motions = [_sailing(0.3, 0.3), _sailing(0.2, 0.3)]
     alone = _diagnosed(motions, candidates=(Sail(),))

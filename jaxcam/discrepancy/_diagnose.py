@@ -1,41 +1,30 @@
 """Diagnose recordings: the verdict is "effect", "none" or "unknown"."""
 
 import dataclasses
-import math
 import shutil
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
 
-from ..fitting import Fit, Input, Parameter, Sensor, Setup, Turning
+from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
+from ._answer import Answer, answered, Conditions
 from ._elsewhere import falls_short, sought_elsewhere
 from ._lagging import long_lag, more_accurate
 from ._mappings import make_room
-from ._set_aside import elsewhere, odd_record, set_aside
-from .evidence import Choice, choose, ripple_of, whole_flights
+from ._set_aside import not_set_aside, odd_record, set_aside, visits_own_states
 from .policy import Policy
-from .report import Diagnosis, diagnosis_of
+from .report import Diagnosis, Verdict
 from .search import (
     Candidates,
     Clock,
-    KeptTrials,
-    Missing,
-    model_errors_dominate,
     Question,
     Report,
     rig_question,
-    Search,
     segmented,
     setup_question,
-    starting_at,
     system_question,
-    Trial,
-    Trials,
-    with_fitted_speed,
-    with_model_error,
 )
 from .terms import Location
 
@@ -92,7 +81,7 @@ def diagnose(
     """
     if isinstance(candidates, str) and candidates != "extended":
         raise ValueError(f'`candidates` is "{candidates}"; give terms, or "extended".')
-    conditions = _Conditions(
+    conditions = Conditions(
         case,
         seed,
         progress or (lambda sentence, fraction: None),
@@ -107,10 +96,10 @@ def diagnose(
         folder: Path | None,
         location: Location = Location(),
         lags: Mapping[str, float] = MappingProxyType({}),
-        before: _Answer | None = None,
-    ) -> _Answer:
+        before: Answer | None = None,
+    ) -> Answer:
         question = rig.question(runs, location, lags, conditions)
-        return _answered(question, folder, conditions, before)
+        return answered(question, folder, conditions, before)
 
     def asked_at(location: Location) -> Diagnosis:
         kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
@@ -133,7 +122,7 @@ def diagnose(
         others = [run for run in recordings if _name_of(run) != odd]
         folder = None if keep is None else keep / "without_one"
         again = asked(others, folder, lags=lags, before=first)
-        found = set_aside(found, again.diagnosis, odd)
+        found = _without_or_with(odd, first, again.diagnosis)
     elif falls_short(found):
         found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
     if keep is not None and not conditions.clock.stopped:
@@ -142,24 +131,24 @@ def diagnose(
     return found
 
 
+def _without_or_with(odd: str, first: Answer, again: Diagnosis) -> Diagnosis:
+    """Return the diagnosis without or with an inconsistent recording.
+
+    If nothing is missing in the others, physics may be missing that acts only in states
+    which the inconsistent recording alone visits; it is then sought.
+
+    **Arguments:** the name of the recording, the answer for all recordings, and the
+    diagnosis of the others.
+    """
+    found = first.diagnosis
+    problem, policy = found.after.problem, found.policy
+    if again.verdict is Verdict.NONE and visits_own_states(problem, odd, policy):
+        return not_set_aside(first.with_functions().diagnosis, odd)
+    return set_aside(found, again, odd)
+
+
 def _name_of(run: Recording | Segments) -> str:
     return run.recording.name if isinstance(run, Segments) else run.name
-
-
-class _Conditions(NamedTuple):
-    """What all searches of a diagnosis have in common."""
-
-    case: str
-    seed: int
-    report: Report
-    policy: Policy
-    clock: Clock
-
-    def trials(self, question: Question, keep: Path | None) -> Trials:
-        """Return the fits of a question; those in a folder are kept."""
-        problem, rig, terms = question.problem, question.rig, question.terms
-        kept = None if keep is None else KeptTrials(keep, problem, self.policy)
-        return Trials(problem, rig, terms, self.policy, self.report, kept, self.clock)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -195,7 +184,7 @@ class _Rig:
         recordings: Sequence[Recording | Segments],
         location: Location,
         lags: Mapping[str, float],
-        conditions: _Conditions,
+        conditions: Conditions,
     ) -> Question:
         """Return the question to be answered from recordings; `lags` (s) of channels
         replace those of their sensors.
@@ -217,131 +206,3 @@ class _Rig:
             *asked,
             location=location,
         )
-
-
-class _Answer(NamedTuple):
-    """A diagnosis, and the fits with functions, the best first, from which a further
-    search in the same recordings, or in some of them, may start.
-    """
-
-    diagnosis: Diagnosis
-    functions: tuple[Missing, ...] = ()
-
-    @property
-    def named(self) -> "_Answer":
-        """The same answer, from which only the named terms are used."""
-        return self._replace(functions=())
-
-
-def _answered(
-    question: Question,
-    keep: Path | None,
-    conditions: _Conditions,
-    before: _Answer | None = None,
-) -> _Answer:
-    """Search for terms, test the result, and return the diagnosis.
-
-    **Arguments:** an answer `before` provides the terms, functions and values from
-    which the search may start.
-    """
-    case, seed, report, policy, _ = conditions
-    ripple = None
-    if question.drives:
-        report("examining the speed of the drive", None)
-        ripple = ripple_of(
-            question.drives, question.drive_noise, question.drive_channel, policy
-        )
-    trials = conditions.trials(question, keep)
-    search = Search(trials)
-    known, earlier = None, ()
-    if before is not None:
-        known = _again(trials, before.diagnosis.names, before.diagnosis.after)
-        earlier = before.functions
-    best = search.run()
-    if known is not None and known.bic < best.bic:
-        best = search.refined(known)
-    sharper = with_fitted_speed(question, trials, best)
-    if sharper is not None:
-        question = sharper
-        folder = None if keep is None else keep / "with_fitted_speed"
-        trials = conditions.trials(question, folder)
-        search = Search(trials)
-        # known even if no time is left for the second search
-        trials.attempt(best.names, best, policy.iterations)
-        best = search.run()
-    bare, rough = trials.known[frozenset()], None
-    far = model_errors_dominate(bare.fit, best.fit, policy)
-    # an odd recording is no missing physics: the diagnosis is repeated without it
-    name = odd_record(best.fit, policy)
-    odd = name is not None and not elsewhere(question.problem, name, policy)
-    if far and not odd:
-        rough = _roughly(question, bare, keep, conditions, earlier)
-    if rough is not None and not rough.choice.explained(policy):
-        return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
-    loosely = rough is not None and bool(rough.choice.functions)
-    if rough is not None and loosely:
-        # their fits to connected pieces may leave only noise; they began with those of
-        # the answer before
-        earlier = rough.choice.functions
-    if rough is not None and rough.choice.named.best.names:
-        # the physics was found, so that the stated noise can be used
-        found = rough.choice.named.best
-        again = _again(trials, found.names, found.fit)
-        if again is not None and again.bic < best.bic:
-            best = search.refined(again)
-    choice = choose(question, trials, best, seed, not odd, earlier, loosely)
-    if rough is not None and rough.finds and not choice.explained(policy):
-        return _Answer(diagnosis_of(case, *rough, ripple), rough.choice.functions)
-    found = diagnosis_of(case, question, trials, choice, ripple)
-    return _Answer(found, choice.functions)
-
-
-def _again(trials: Trials, names: Collection[str], found: Fit) -> Trial | None:
-    """Fit the terms of another problem, starting from their strengths there."""
-    terms = frozenset(term.name for term in trials.terms if term.name in names)
-    point = starting_at(found, trials.problem)
-    start = Trial(terms, dataclasses.replace(found, point=point), math.inf, 0, False)
-    return trials.attempt(terms, start, trials.policy.iterations)
-
-
-class _Roughly(NamedTuple):
-    """A question that allows for errors of the model, with its fits and the terms
-    chosen.
-    """
-
-    question: Question
-    trials: Trials
-    choice: Choice
-
-    @property
-    def finds(self) -> bool:
-        """Whether terms or functions were found."""
-        named, unnamed = self.choice.named, self.choice.unnamed
-        return bool(named.best.names) or unnamed.found is not None
-
-
-def _roughly(
-    question: Question,
-    bare: Trial,
-    keep: Path | None,
-    conditions: _Conditions,
-    earlier: Sequence[Missing] = (),
-) -> _Roughly | None:
-    """Choose terms with joints and noise that allow for errors of the model.
-
-    **Arguments:** `bare`: the fit of the textbook model to complete flights; `earlier`
-    fits with functions.
-
-    **Returns:** `None` if single pieces of flight hardly show the errors.
-    """
-    _, seed, report, policy, _ = conditions
-    report("allowing for model errors", None)
-    rough = with_model_error(question, policy)
-    if rough is None:
-        return None
-    folder = None if keep is None else keep / "with_model_error"
-    trials = conditions.trials(rough, folder)
-    choice = choose(rough, trials, Search(trials).run(), seed, earlier=earlier)
-    report("fitting complete flights", None)
-    whole = whole_flights(bare.fit, choice.fit, rough.looseness, policy)
-    return _Roughly(rough, trials, dataclasses.replace(choice, whole=whole))

@@ -2,6 +2,8 @@
 
 Physics common to all recordings cannot explain a single misread recording (wrong gain,
 rig or unit). If it is not excluded, this recording hides physics missing in the others.
+If nothing is missing in the others, a recording that visits states of its own is not
+excluded, because physics may be missing that acts only there.
 """
 
 import dataclasses
@@ -9,8 +11,9 @@ import dataclasses
 import numpy as np
 
 from ..fitting import Fit, Problem
+from ._elsewhere import falls_short
 from .policy import Policy
-from .report import Caveat, Diagnosis, Reason, Verdict
+from .report import Caveat, Diagnosis, Reason
 
 
 def odd_record(found: Fit, policy: Policy) -> str | None:
@@ -44,34 +47,77 @@ def cost_by_record(found: Fit) -> dict[str, float]:
     return dict(zip(problem.records, (total / samples).tolist()))
 
 
-def elsewhere(problem: Problem, name: str, policy: Policy) -> bool:
+def visits_own_states(problem: Problem, name: str, policy: Policy) -> bool:
     """Return whether a recording visits states that no other recording visits.
 
     Missing physics may then act in this recording only. At least a fraction
-    `policy.odd_share` of the samples of one of its channels must lie outside the range
-    of this channel in the other recordings.
+    `policy.odd_share` of the samples of a channel, the values of a state component at
+    the beginnings of the pieces of flight, or the approach speeds must lie outside the
+    range of the other recordings.
     """
-    runs = [part.recording for part in problem.segments]
-    (odd,) = [run for run in runs if run.name == name]
-    others = [run for run in runs if run is not odd]
-    for channel in problem.model.sensors:
-        if channel not in odd.channels:
-            continue
-        known = [run[channel] for run in others if channel in run.channels]
-        if not known:
-            continue
-        seen, its = np.concatenate(known), odd[channel]
-        outside = (its < np.nanmin(seen)) | (its > np.nanmax(seen))
-        if np.mean(outside) >= policy.odd_share:
-            return True
-    return False
+    groups = zip(*(_visited(problem, k) for k in range(len(problem.records))))
+    number = problem.records.index(name)
+    return any(
+        _share_outside(
+            group[number],
+            np.concatenate([*group[:number], *group[number + 1 :]]),
+            policy,
+        )
+        >= policy.odd_share
+        for group in groups
+    )
+
+
+def _visited(problem: Problem, k: int) -> list[np.ndarray]:
+    """Return the finite values of each channel and state component of a recording, and
+    its approach speeds.
+    """
+    part = problem.segments[k]
+    run, used = part.recording, np.ones(len(part.recording.time), dtype=bool)
+    if run.filled is not None:
+        used &= ~np.asarray(run.filled)
+    nothing = np.zeros(0)
+    values = [
+        run[name][used] if name in run.channels else nothing
+        for name in problem.model.sensors
+    ]
+    exists = np.asarray(problem.pieces.exists)[k]
+    values += list(np.asarray(problem.start.states)[k][exists].T)
+    values.append(np.asarray(part.impacts.approach))
+    return [one[np.isfinite(one)] for one in values]
+
+
+def _share_outside(own: np.ndarray, others: np.ndarray, policy: Policy) -> float:
+    """Return the fraction of values that lie outside the range of others, without its
+    tails and extended by a margin.
+    """
+    if not len(own) or not len(others):
+        return 0.0
+    tail = policy.velocity_tail
+    low, high = np.quantile(others, [tail, 1 - tail])
+    margin = policy.nearby * (high - low)
+    return float(np.mean((own < low - margin) | (own > high + margin)))
+
+
+def not_set_aside(found: Diagnosis, name: str) -> Diagnosis:
+    """Return the diagnosis of all recordings with a caveat that its result rests on an
+    inconsistent recording; nothing is missing in the others.
+    """
+    where = "states that no other recording visits"
+    if falls_short(found):
+        said = f"Either {name} was misread, or unidentified physics acts in {where}."
+    else:
+        said = f"What is missing acts in {where}, or {name} was misread."
+    sentence = (
+        f"Without the recording {name}, nothing is missing. {said} Check how {name} "
+        "was recorded and read, or record such states again."
+    )
+    caveat = Caveat(Reason.SET_ASIDE, sentence)
+    return dataclasses.replace(found, caveats=(caveat, *found.caveats))
 
 
 def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     """Return the diagnosis of the other recordings, if it explains them better.
-
-    If nothing is missing in the others, physics may be missing in states that only the
-    inconsistent recording visits; the diagnosis of all recordings is then returned.
 
     **Arguments:** the diagnosis of all recordings, the one without the inconsistent
     recording, and its name.
@@ -80,9 +126,6 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
     better = (
         max(cost_by_record(again.after).values()) < costs[name] / found.policy.odd_ratio
     )
-    there = elsewhere(found.after.problem, name, found.policy)
-    if there and again.verdict is Verdict.NONE:
-        better = False
     chosen = again if better else found
     done = "is excluded" if better else "is not explained by any of the terms tried"
     sentence = (
@@ -92,10 +135,5 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
         f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. Check how "
         f"{name} was recorded and read."
     )
-    if there:
-        sentence += (
-            f" Parts of {name} are outside the range of the other recordings; physics "
-            "may be missing that acts only there."
-        )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

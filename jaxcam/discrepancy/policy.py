@@ -93,7 +93,8 @@ class Policy:
     )
     half_information: float = decides(
         1e-3,
-        "fraction of the information on a term that a half of the recordings needs",
+        "minimum fraction of the information on a term in one half of the recordings "
+        "for an estimate from this half",
     )
     stretches: int = decides(4, "maximum number of bootstrap blocks per recording")
     stretch_pieces: int = decides(
@@ -128,13 +129,13 @@ class Policy:
     )
     odd_ratio: float = decides(
         10.0,
-        "a recording is excluded if its cost per sample is at least this many times "
-        "that of any other recording",
+        "a recording is inconsistent if its cost per sample is at least this many "
+        "times that of any other recording",
     )
     odd_share: float = decides(
         0.05,
-        "fraction of its samples outside the range of the other recordings at which a "
-        "recording may contain physics that acts only there",
+        "minimum fraction of the values of a recording outside the range of all others "
+        "at which physics may act only there",
     )
     records_apart: int = decides(
         4, "minimum number of recordings from which one may be excluded"
@@ -320,13 +321,13 @@ class Policy:
         3.0, "parameter shift, in standard errors, above which the summary reports it"
     )
     rival: float = shows(
-        30.0, "difference in BIC up to which the next recording must rule out a rival"
+        30.0, "BIC difference below which the next recording should tell rivals apart"
     )
     absent_errors: float = shows(
         10.0, "residual, in standard errors, assigned to an event that does not occur"
     )
     nearby: float = shows(
-        0.03, "fraction of the range within which data count as near a point"
+        0.03, "distance from a point, as a fraction of the range, that counts as near"
     )
     visited: float = shows(
         0.1, "minimum data density, relative to a uniform density, to show a function"

@@ -91,6 +91,8 @@ def rank_decoys(search: FreeSearch, found: Missing) -> None:
         return
     nothing = Subset(search.apart, (), frozenset())
     bare = search.fits.fitted(nothing, search.apart.start, search.policy.iterations)
+    if not math.isfinite(bare.score):
+        return
     search.first = search.leads.ranked(search.apart, bare, True)
 
 

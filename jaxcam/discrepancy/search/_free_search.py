@@ -104,7 +104,7 @@ class FreeSearch:
         most = self.policy.iterations
         found = self.fits.fitted(self._tight(found), found.fit.point, most)
         found = self._grown(found, False)
-        if self.need.preferred:
+        if self.need.preferred or not math.isfinite(found.score):
             return None
         swapped = self._swapped(found)
         if swapped is not found:
@@ -222,7 +222,8 @@ class FreeSearch:
     def _grown(self, found: Missing, apart: bool) -> Missing:
         """Add functions or terms one at a time."""
         problem = self.apart if apart else self.problem
-        while len(found.functions) + len(found.names) < self.policy.most_terms:
+        most = self.policy.most_terms if math.isfinite(found.score) else 0
+        while len(found.functions) + len(found.names) < most:
             if apart and heat_of(found.fit) < self.policy.as_noise:
                 # single pieces of flight contain little information on small effects
                 break

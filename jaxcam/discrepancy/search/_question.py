@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -128,11 +129,19 @@ def with_seen_noise(
     return found, tuple(noisier)
 
 
-def refuse_one(runs: Sequence[Recording | Segments]) -> None:
+def check_runs(runs: Sequence[Recording | Segments]) -> None:
+    """Refuse a single recording, and recordings of the same name."""
     if len(runs) < 2:
         raise RecordingError(
             f"There is only {len(runs)} recording; give at least two of the same rig "
             "at different speeds, so that one can be predicted from the other."
+        )
+    names = [r.recording.name if isinstance(r, Segments) else r.name for r in runs]
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        raise RecordingError(
+            f"More than one recording is called {repeated[0]!r}; give each a name of "
+            "its own, for example by `dataclasses.replace(run, name=...)`."
         )
 
 

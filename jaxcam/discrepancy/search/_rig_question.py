@@ -20,8 +20,8 @@ from ._motion_scales import motion_scales
 from ._question import (
     by_listing,
     Candidates,
+    check_runs,
     Question,
-    refuse_one,
     Report,
     Shown,
     term_parameters,
@@ -48,7 +48,7 @@ def rig_question(
     **Raises:** `RecordingError` for recordings that cannot be those of the rig.
     """
     runs = tuple(recordings)
-    refuse_one(runs)
+    check_runs(runs)
     _check(rig, [r.recording if isinstance(r, Segments) else r for r in runs])
     report("finding impacts and contacts", None)
     base = cam_follower_model(rig)

@@ -37,8 +37,8 @@ from ._of_base import channel_of, measured_in, of_base, usual_state, within
 from ._question import (
     by_listing,
     Candidates,
+    check_runs,
     Question,
-    refuse_one,
     Report,
     term_parameters,
     with_seen_noise,
@@ -62,7 +62,7 @@ def segmented(
     **Raises:** `RecordingError` if the recordings cannot be those of the rig.
     """
     runs = tuple(recordings)
-    refuse_one(runs)
+    check_runs(runs)
     for run in runs:
         check_channels(run.recording if isinstance(run, Segments) else run)
     report("finding impacts and contacts", None)
