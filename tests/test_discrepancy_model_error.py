@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from swing_rig import PARAMETERS, Swing
 
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
-from jaxcam.discrepancy._diagnose import _again
+from jaxcam.discrepancy._answer import _again
 from jaxcam.discrepancy.evidence._visited_states import visited_states
 from jaxcam.discrepancy.report import Reason
 from jaxcam.discrepancy.search import (
