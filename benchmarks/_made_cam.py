@@ -9,17 +9,12 @@ from benchmarks._hidden_physics import Hidden
 from benchmarks._hidden_records import SETTLE
 from benchmarks._numba_rig import Samples
 from benchmarks._own_rig_makers import Motion
-from benchmarks.coverage import random_rig, recording
+from benchmarks.coverage import recording
 from benchmarks.fresh import DURATION, SPANS_RPM
 from jaxcam.recordings import Recording
 
 
 _INTERVAL = 5e-4
-
-
-def drawn(rig, rng):
-    """A random cam-follower within the tolerances."""
-    return random_rig(rig, rng)
 
 
 def made(rig, truth, rng, hidden: Hidden | None) -> list[tuple[Recording, Motion]]:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from benchmarks._hidden_physics import Effect, Hidden
 from benchmarks._own_rig_makers import made_case, MAKERS, Motion
+from benchmarks.coverage import random_rig
 from benchmarks.own_rigs import drawn, RIGS
 from jaxcam.data import DEMO_RIG
 from jaxcam.fitting import read_setup
@@ -43,7 +44,7 @@ class MadeRig(NamedTuple):
     def drawn(self, rng):
         """A random rig within the tolerances."""
         if self.name == _CAM:
-            return _cam().drawn(self.given, rng)
+            return random_rig(self.given, rng)
         return drawn(self.given, rng)
 
     def made(self, truth, rng, hidden: Hidden | None) -> list[tuple[Recording, Motion]]:

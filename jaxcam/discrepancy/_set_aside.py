@@ -53,7 +53,7 @@ def visits_own_states(problem: Problem, name: str, policy: Policy) -> bool:
     Missing physics may then act in this recording only. At least a fraction
     `policy.odd_share` of the samples of a channel, the values of a state component at
     the beginnings of the pieces of flight, or the approach speeds must lie outside the
-    range of the other recordings.
+    range of the other recordings, extended at both ends by the same fraction.
     """
     groups = zip(*(_visited(problem, k) for k in range(len(problem.records))))
     number = problem.records.index(name)
@@ -95,7 +95,7 @@ def _share_outside(own: np.ndarray, others: np.ndarray, policy: Policy) -> float
         return 0.0
     tail = policy.velocity_tail
     low, high = np.quantile(others, [tail, 1 - tail])
-    margin = policy.nearby * (high - low)
+    margin = policy.odd_share * (high - low)
     return float(np.mean((own < low - margin) | (own > high + margin)))
 
 

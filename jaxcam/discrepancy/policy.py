@@ -134,8 +134,8 @@ class Policy:
     )
     odd_share: float = decides(
         0.05,
-        "minimum fraction of the values of a recording outside the range of all others "
-        "at which physics may act only there",
+        "physics may act in a single recording if this fraction of its values is "
+        "outside the range of all others, extended by this fraction at both ends",
     )
     records_apart: int = decides(
         4, "minimum number of recordings from which one may be excluded"

@@ -222,6 +222,7 @@ class FreeSearch:
     def _grown(self, found: Missing, apart: bool) -> Missing:
         """Add functions or terms one at a time."""
         problem = self.apart if apart else self.problem
+        # a failed fit cannot be extended
         most = self.policy.most_terms if math.isfinite(found.score) else 0
         while len(found.functions) + len(found.names) < most:
             if apart and heat_of(found.fit) < self.policy.as_noise:
