@@ -17,6 +17,14 @@ def _forced(p, t, x):
     return field, (jnp.stack(watched), jnp.maximum(x[0], x[1])[None])
 
 
+def _updated(p, t, x):
+    """Elements that are changed, absolute values, and negative powers."""
+    field = jnp.zeros(2).at[0].set(x[1]).at[1].add(-(jnp.abs(x[0] - t * p) ** 3))
+    inverse = jax.lax.integer_pow(1 + x[0] ** 2, -2)
+    watched = x.at[1].multiply(inverse), jnp.abs(x.at[0].add(-5.0))
+    return field, (watched[0], watched[1][:1] + x[0] ** 0)
+
+
 def _mixed(p, t, x):
     """Operations without a recurrence, and linear algebra."""
     matrix = jnp.array([[2.0, 0.3], [0.3, 1.0]]) + jnp.outer(x, x)
@@ -25,7 +33,7 @@ def _mixed(p, t, x):
     return field, (jnp.log(2 + pull**2), jnp.arctan2(x, pull)[:1])
 
 
-@pytest.mark.parametrize("function", [_forced, _mixed])
+@pytest.mark.parametrize("function", [_forced, _updated, _mixed])
 def test_derivatives_along_a_motion(function):
     """All derivatives up to the third."""
     p, t, x = jnp.asarray(1.7), jnp.asarray(0.4), jnp.array([0.6, 0.35])

@@ -26,8 +26,6 @@ MOVES = frozenset(
     gather pad rev reshape scatter slice split squeeze stack tile transpose
     """.split()
 )
-# maximum number of values that a scatter may combine: one for each bit of a float
-_BITS = 52
 # maximum size of a table whose elements are selected by comparison with an unknown
 # index; longer ones are read from memory
 _MOST = 64
@@ -86,44 +84,6 @@ def _indices_of(name: str, count: int) -> tuple[int, ...]:
     if name == "dynamic_slice":
         return tuple(range(1, count))
     return tuple(range(2, count)) if name == "dynamic_update_slice" else ()
-
-
-# scatters that combine old and new values, each with its operation
-SCATTERS = {
-    "scatter-add": "add",
-    "scatter-sub": "sub",
-    "scatter-mul": "mul",
-    "scatter-min": "min",
-    "scatter-max": "max",
-}
-
-
-@no_type_check
-def scattered(operation: Callable, equation, inputs) -> np.ndarray:
-    """Emit a combining scatter with known indices.
-
-    **Raises:** `Lacking` if more values are combined than a float has bits.
-    """
-    onto, where, given = inputs
-    if given.size > _BITS:
-        raise Lacking(f"{equation.primitive.name} of {given.size} numbers")
-    # one bit per value marks its destination
-    bits = 2.0 ** np.arange(given.size).reshape(given.shape)
-    params = equation.params
-    with jax.ensure_compile_time_eval():
-        found = jax.lax.scatter_add(
-            jnp.zeros(onto.shape),
-            jnp.asarray(join_known(where)),
-            jnp.asarray(bits),
-            params["dimension_numbers"],
-            mode=params["mode"],
-        )
-    found, out = np.asarray(found), onto.copy()
-    for index in np.ndindex(*out.shape):
-        for k in range(given.size):
-            if int(found[index]) >> k & 1:
-                out[index] = operation(out[index], given.ravel()[k])
-    return out
 
 
 def has_known_indices(equation, inputs) -> bool:

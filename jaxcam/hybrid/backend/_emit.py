@@ -5,7 +5,14 @@ from typing import no_type_check
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
-from ..lowering import computed, has_program, join_known, opened
+from ..lowering import (
+    COMBINED,
+    computed,
+    has_program,
+    join_known,
+    opened,
+    scattered,
+)
 from ._arrays import (
     extreme_place,
     has_known_indices,
@@ -16,8 +23,6 @@ from ._arrays import (
     product,
     reduced,
     running,
-    scattered,
-    SCATTERS,
     value_of,
 )
 from ._control import branches, scan, while_loop
@@ -121,8 +126,10 @@ class Emitter:
         if name in ("argmax", "argmin"):
             kinds = dtypes[0], output.dtype
             return extreme_place(self.w, name, inputs[0], params["axes"], *kinds)
-        if name in SCATTERS and has_known_indices(equation, inputs):
-            return scattered(pair(SCATTERS[name]), equation, inputs)
+        if name in COMBINED and has_known_indices(equation, inputs):
+            made = scattered(lambda n, *e: pair(n)(*e), equation, inputs)
+            if made is not None:
+                return made
         if name in ("gather", "dynamic_slice", "dynamic_update_slice"):
             return looked_up(self.w, equation, inputs, dtypes)[0]
         raise Lacking(name)

@@ -150,6 +150,11 @@ def first_state(
     The state of an invalid start becomes NaN. `longest` is the longest allowed step
     (s), and `period` the period of the forcing (s).
     """
+    with functions.sharing():
+        return _first_state(functions, t0, x, t1, longest, period)
+
+
+def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     m, free = functions.m, tuple(jnp.asarray(False) for _ in range(functions.m))
     sides, crossings, slides, stuck = first_sides(functions, t0, x, free)
     free = free + sides

@@ -23,6 +23,7 @@ from ._jaxprs import has_saving_rule, opened, without_unused
 from ._known import computed, is_known, join_known
 from ._moves import moved, MOVES
 from ._scalars import Memory, once
+from ._scatter import COMBINED, scattered
 from ._sincos import sincos
 from ._taylor import by_nested_derivatives, coefficient, has_series, in_series, Series
 
@@ -43,7 +44,7 @@ _SUMS = {
 
 
 _TURNS = frozenset({"sin", "cos", "tan"})
-# primitives that the rules for series use
+# primitives that the rules for series and scatters use
 _PRIMITIVES = {
     "add": jax.lax.add_p,
     "add_any": jax.lax.add_p,
@@ -51,6 +52,7 @@ _PRIMITIVES = {
     "mul": jax.lax.mul_p,
     "div": jax.lax.div_p,
     "neg": jax.lax.neg_p,
+    "sign": jax.lax.sign_p,
     "ge": jax.lax.ge_p,
     "select_n": jax.lax.select_n_p,
     "max": jax.lax.max_p,
@@ -161,6 +163,10 @@ def _apply(equation, inputs, memory):
         return [_product(inputs, params, memory)]
     if name in _ELEMENTWISE:
         return [_elementwise(equation, inputs, outputs[0].shape, memory)]
+    if name == "scatter" or name in COMBINED:
+        made = _scattered(equation, inputs, memory)
+        if made is not None:
+            return [made]
     if any(has_series(i.ravel()) for i in inputs):
         return _by_derivatives(equation, inputs, memory)
     # these parameters include a user-defined rule, such as a custom derivative
@@ -168,6 +174,18 @@ def _apply(equation, inputs, memory):
     made = equation.primitive.bind(*[join_traced(i, memory) for i in inputs], **params)
     made = made if equation.primitive.multiple_results else [made]
     return [split(m) for m in made]
+
+
+@no_type_check
+def _scattered(equation, inputs, memory):
+    """Return the elements after a scatter at known indices; otherwise `None`."""
+    if not all(is_known(e) for e in inputs[1].ravel()):
+        return None
+
+    def combine(name, old, new):
+        return _binary(_PRIMITIVES[name], old, new, memory)
+
+    return scattered(combine, equation, inputs)
 
 
 def _reduce(operation, elements, axes, shape, memory):

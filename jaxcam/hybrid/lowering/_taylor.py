@@ -68,8 +68,12 @@ def in_series(name: str, params, elements, apply: Callable):
         return Series(
             apply(name, which, *(p[k] for p in parts[1:])) for k in range(order + 1)
         )
-    if name == "integer_pow" and params["y"] >= 0:
-        return Series(_power(apply, order, parts[0], params["y"]))
+    if name == "integer_pow":
+        exponent = params["y"]
+        power = _power(apply, order, parts[0], abs(exponent))
+        if exponent < 0:
+            power = _div(apply, order, [np.float64(1.0), *[_ZERO] * order], power)
+        return Series(power)
     if name == "convert_element_type":
         if not jnp.issubdtype(params["new_dtype"], jnp.floating):
             return apply(name, parts[0][0])
@@ -130,7 +134,7 @@ def _square(apply, order, a):
 
 def _power(apply, order, a, exponent: int):
     if exponent == 0:
-        return [np.float64(1.0)]
+        return [np.float64(1.0), *[_ZERO] * order]
     found = a
     for _ in range(exponent - 1):
         found = _mul(apply, order, found, a)
@@ -174,6 +178,11 @@ def _one_of(apply, order, first, a, b):
     return [apply("select_n", first, b[k], a[k]) for k in range(order + 1)]
 
 
+def _abs(apply, order, a):
+    slope = apply("sign", a[0])
+    return [apply("abs", a[0]), *(apply("mul", slope, c) for c in a[1:])]
+
+
 def _slopes(apply, order, a):
     """Return the coefficients of a series, each multiplied by its index."""
     return [_ZERO] + [apply("mul", a[k], np.float64(k)) for k in range(1, order + 1)]
@@ -208,6 +217,7 @@ _RULES = {
     "add_any": _add,
     "sub": _sub,
     "neg": _neg,
+    "abs": _abs,
     "mul": _mul,
     "square": _square,
     "div": _div,
