@@ -308,7 +308,8 @@ def test_a_fit_that_fails_with_a_new_smoothness_does_not_replace_the_one_before(
             return found.cost + 5.0
 
     subset = Subset(problem, ("first",), frozenset())  # pyright: ignore
-    found = Planned((), (), POLICY).fitted(subset, None, beaten=120.0)  # pyright: ignore
+    start = SimpleNamespace(values=np.zeros(1), states=np.zeros(1))
+    found = Planned((), (), POLICY).fitted(subset, start, beaten=120.0)  # pyright: ignore
     assert (found.functions, found.score) == (("first",), 105.0)
 
 
@@ -320,3 +321,33 @@ def test_a_failed_fit_has_an_infinite_score(cost):
     smooth = SimpleNamespace(price=lambda samples: 0.0, smooth=True)
     subset = Subset(failed.problem, (smooth,), frozenset())  # pyright: ignore
     assert FreeFits((), (), POLICY).score(subset, failed) == np.inf  # pyright: ignore
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_a_fit_is_made_only_once():
+    """A second search with the same start, limits and problem finds the fit; any other
+    is made.
+    """
+    made = []
+
+    class Counted(FreeFits):
+        def _fitted(self, *given):
+            made.append(given)
+            return len(made)
+
+    def start(value):
+        return SimpleNamespace(values=np.array([value]), states=np.zeros(2))
+
+    fits, problems = Counted((), (), POLICY), (SimpleNamespace(), SimpleNamespace())
+    one, other = (Subset(p, ("a",), frozenset()) for p in problems)  # pyright: ignore
+    same = [fits.fitted(one, start(1.0), beaten=5.0) for _ in range(3)]  # pyright: ignore
+    assert same == [1, 1, 1]
+    others = [
+        (one, start(2.0), None, 5.0),
+        (one, start(1.0), None, 6.0),
+        (one, start(1.0), 9, 5.0),
+        (one._replace(names=frozenset({"drag"})), start(1.0), None, 5.0),
+        (one._replace(functions=("b",)), start(1.0), None, 5.0),
+        (other, start(1.0), None, 5.0),
+    ]
+    assert [fits.fitted(*each) for each in others] == [2, 3, 4, 5, 6, 7]

@@ -1,6 +1,5 @@
 """Seek unnamed functions that explain the residual of the named terms."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -96,7 +95,7 @@ def without_a_name(
 
     by_chance: list[Shuffled] = []
 
-    def new_search(elements: bool, policy: Policy = policy):
+    def new_search(elements: bool) -> FreeSearch:
         return FreeSearch(
             problem,
             question.rig,
@@ -110,9 +109,8 @@ def without_a_name(
             bool(question.model_errors),
         )
 
-    def searched(elements: bool, policy: Policy = policy):
-        search = new_search(elements, policy)
-        known = refitted(search, () if elements else earlier)
+    def searched(search: FreeSearch):
+        known = refitted(search, () if search.elements else earlier)
         if known is None or search.falls_short(known, tolerated=not loosely):
             others = search.run()
             found = [one for one in (known, others) if one is not None]
@@ -131,14 +129,14 @@ def without_a_name(
                 return Unnamed(found, its, by_chance=tuple(by_chance))
     # elements with an internal state are tried only if functions may not suffice
     always = policy.elements > 1
-    results = [searched(always)]
+    results = [searched(new_search(always))]
     first, found, _ = results[0]
     if not always and first.lacks_element(found) and not trials.clock.over:
-        results.append(searched(True))
+        results.append(searched(first.repeated(True)))
         second, found, _ = results[-1]
         if first.need.preferred and second.falls_short(found):
             # the first search ended before it had tried functions alone
-            results.append(searched(False, dataclasses.replace(policy, elements=0)))
+            results.append(searched(first.repeated(False)))
     kept = [(one, its) for _, one, its in results if one is not None]
     if not kept:
         return Unnamed(by_chance=tuple(by_chance))

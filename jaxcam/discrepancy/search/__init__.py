@@ -9,7 +9,6 @@ from ._clock import Clock as Clock
 from ._earlier import (
     rank_decoys as rank_decoys,
     refitted as refitted,
-    starting_at as starting_at,
 )
 from ._extended import extended as extended, with_states as with_states
 from ._free_fits import Missing as Missing
@@ -48,6 +47,7 @@ from ._roughness import occam as occam, Roughness as Roughness, roughness as rou
 from ._search import Search as Search
 from ._shuffled import Shuffled as Shuffled
 from ._slots import Free as Free, free_term as free_term
+from ._starting_at import starting_at as starting_at
 from ._system_question import (
     segmented as segmented,
     setup_question as setup_question,

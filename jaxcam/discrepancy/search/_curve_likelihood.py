@@ -14,7 +14,8 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from ..terms import Family, free_basis, Place, Primitive
-from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._free_fits import FreeFits, Missing, Subset
+from ._heat import heat_of
 from ._roughness import beside, occam_of
 from ._slots import Free
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from ...fitting import Problem
 from ..policy import Policy
-from ._free_fits import FreeFits, heat_of, heated, Missing
+from ._free_fits import FreeFits, Missing
+from ._heat import heat_of, heated
 from ._hidden_leads import worthwhile
 from ._hidden_signals import Driven
 from ._local_force import force_response

@@ -13,7 +13,8 @@ from ...fitting import Problem
 from ...fitting.engine import Point
 from ._clock import Clock
 from ._curve_likelihood import CurveLikelihood, promising, Start
-from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._free_fits import FreeFits, Missing, Subset
+from ._heat import heat_of
 from ._hidden_state import Hidden
 from ._leads import shows_apart
 from ._named_parts import friction_named, with_named_friction

@@ -14,6 +14,7 @@ from ..terms import Term
 from ._blocks import blocks_of, values_of
 from ._gains import gain
 from ._given_up import given_up
+from ._heat import heat_of, heated, unscaled
 from ._hidden_state import Hidden, recentred, started
 from ._roughness import occam, roughness
 from ._slots import filled, Free, Part
@@ -68,6 +69,7 @@ class FreeFits:
 
     def __init__(self, rig: Sequence[str], terms: Sequence[Term], policy: Policy):
         self.rig, self.terms, self.policy = tuple(rig), tuple(terms), policy
+        self._made: dict[Any, Missing] = {}
 
     def free(self, found: Missing | Subset) -> list[str]:
         """Return the names of the free parameters: those of the rig, terms and
@@ -90,8 +92,18 @@ class FreeFits:
     ) -> Missing:
         """Fit a subset, including the smoothness of its functions.
 
-        A fit that does not fall below the cost `beaten` soon enough is stopped.
+        A fit that does not fall below the cost `beaten` soon enough is stopped. The
+        same fit is made only once.
         """
+        parts = np.asarray(start.values), np.asarray(start.states)
+        bits = tuple(part.tobytes() for part in parts)
+        # the problem is kept with the fit, so that its `id` is unique
+        key = id(subset.problem), *subset[1:], *bits, iterations, beaten
+        if key not in self._made:
+            self._made[key] = self._fitted(subset, start, iterations, beaten)
+        return self._made[key]
+
+    def _fitted(self, subset: Subset, start: Point, iterations, beaten) -> Missing:
         policy, functions = self.policy, subset.functions
         heat, point, found, failed = 1.0, start, None, False
         earlier: tuple[Subset, Fit] | None = None
@@ -301,35 +313,6 @@ def _known(information, blocks, one: Part) -> None:
         rows = blocks.rows(one.coefficients)
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
         information[rows, rows] += (blocks.scale[rows] / spread) ** 2
-
-
-def heat_of(found: Fit) -> float:
-    """Return the cost per sample of a fit, or one if that is larger."""
-    return max(1.0, found.cost / found.problem.samples)
-
-
-def heated(problem: Problem, heat: float) -> Problem:
-    """Return the problem with the weight of its priors multiplied by `heat`."""
-    return dataclasses.replace(
-        problem,
-        parameters=tuple(
-            dataclasses.replace(p, tolerance=p.tolerance / math.sqrt(heat))
-            if math.isfinite(p.tolerance)
-            else p
-            for p in problem.parameters
-        ),
-    )
-
-
-def unscaled(blocks, names, heat: float):
-    """Return information and score, divided by the cost per sample (`heat`), with the
-    parameters `names` in their own units.
-    """
-    information, score = (x / heat for x in blocks.total())
-    unit = np.ones(len(blocks.names))
-    own = blocks.rows(names)
-    unit[own] = 1 / blocks.scale[own]
-    return information * np.outer(unit, unit), score * unit
 
 
 def _alike(fresh: Sequence[Part], functions: Sequence[Part]) -> bool:

@@ -4,30 +4,30 @@ The search first uses individual pieces of flight, which do not depend on impact
 other flights, and then whole recordings.
 """
 
-import dataclasses
+import copy
 import math
 from collections.abc import Callable, Sequence
 
 from scipy.stats import chi2
 
 from ...fitting import Problem
-from ...fitting.engine import Point, separated
+from ...fitting.engine import Point
 from ..policy import Policy
-from ..terms import Family, own_faults, spelled, Term, Where
+from ..terms import Family, own_faults, spelled, Term
+from ._additions import Additions
 from ._clock import Clock
 from ._element_need import ElementNeed
 from ._formulas import formulated, leaves_noise
-from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._free_fits import FreeFits, Missing, Subset
+from ._heat import heat_of
 from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
-from ._hidden_signals import driven_by
-from ._hidden_state import started
-from ._leads import Lead, Leads, shows_apart
+from ._leads import Lead, Leads
 from ._left_out import LeftOut
 from ._product_search import Products
 from ._recentre import recentred
+from ._rooms import Rooms
 from ._shuffled import Shuffled, shuffled
-from ._slots import emptied, Free, roomy
 
 
 class FreeSearch:
@@ -59,28 +59,40 @@ class FreeSearch:
         self.families = tuple(families)
         # fits of whole recordings with other functions, or other forms of them
         self.tried: list[Missing] = []
+        # formulas found before, with the fit in which they were sought
+        self.formulas: dict[int, tuple[Missing, Missing, list[Missing]]] = {}
         # candidates for the first function, and the costs of those fitted to single
         # pieces
         self.first: list[Lead] | None = None
         self.alone: dict[str, float] = {}
-        gaps = sorted({f.constraint for f in families if f.where is Where.IMPACT})
-        unit = self.families[0].motion_unit
-        driven = driven_by(problem, unit) if elements or policy.elements else None
-        room, left = (driven, None) if elements else (None, driven)
+        self.rooms = Rooms(
+            problem, self.families, elements or policy.elements > 0, roughly
+        )
+        self.elements = elements and self.rooms.driven is not None
+        left = None if elements else self.rooms.driven
         self.need = ElementNeed(self.fits, left, policy)
-        self.problem = roomy(problem, self.families[0], gaps, room)
+        # with model errors, the predicted gains of elements are not reliable
+        self.roughly = roughly
+        self.apart, self.problem = self.rooms.plain
+        self.additions = Additions(self.fits, self.rooms)
         # unnamed functions must not represent the gain, offset and lag of a sensor
         faults = own_faults(self.problem.model, self.problem.parameters)
-        self.left_out = LeftOut(self.fits, self.terms, self.problem, policy)
-        self.leads = Leads(self.fits, self.families, room, faults, policy, progress)
-        # with model errors, the predicted gains of elements are not reliable, and the
-        # pieces are hardly connected anyway
-        self.roughly, self.apart = roughly, self.problem
-        if not roughly:
-            extras = separated(self.problem.extras)
-            self.apart = dataclasses.replace(self.problem, extras=extras)
-        both = self.apart, self.problem
+        self.left_out = LeftOut(
+            self.fits, self.terms, lambda found: self.rooms.of(found).whole, policy
+        )
+        self.leads = Leads(self.fits, self.families, faults, policy, progress)
+        both = self.rooms.plain
         self.products = Products(self.fits, families, both, progress, self.clock)
+
+    def repeated(self, elements: bool) -> "FreeSearch":
+        """Return a search with elements among the candidates, or with functions alone;
+        it does not repeat the fits made before.
+        """
+        other = copy.copy(self)
+        other.tried, other.first, other.alone = [], None, {}
+        other.elements = elements and self.rooms.driven is not None
+        other.need = ElementNeed(self.fits, None, self.policy)
+        return other
 
     def run(self) -> Missing | None:
         """Return the functions and terms found, or `None` if none is significant.
@@ -113,7 +125,8 @@ class FreeSearch:
             return None
         whole = recentred(self.fits, found)
         found = self._pruned(whole)
-        found = simplified(self.fits, self.problem, found, self.progress)
+        problem = self.rooms.of(found).whole
+        found = simplified(self.fits, problem, found, self.progress)
         curve, found = found, self._formulated(found)
         if self._lacks(curve, found, whole):
             # forms do not make up for the parts left out: start from the complete fit
@@ -152,12 +165,13 @@ class FreeSearch:
 
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
-        small = self._small(found)
-        found, forms = formulated(
-            self.fits, found, self.apart, small, self.progress, self.clock
-        )
+        if id(found) not in self.formulas:
+            small, apart = self._small(found), self.rooms.of(found).apart
+            made = formulated(self.fits, found, apart, small, self.progress, self.clock)
+            self.formulas[id(found)] = found, *made
+        _, best, forms = self.formulas[id(found)]
         self.tried += forms
-        return found
+        return best
 
     def _others(self) -> list[Lead]:
         """Return the candidates for the first function that were not fitted to whole
@@ -180,7 +194,7 @@ class FreeSearch:
         one.
         """
         self.progress(f"fitting {spelled(lead.label)} instead", None)
-        found = self._with(self.problem, bare, lead)
+        found = self.additions.fitted(bare, lead, False)
         if found is not None:
             self.tried.append(found)
         return found
@@ -217,17 +231,18 @@ class FreeSearch:
         return self.fits.fitted(nothing, start, self.policy.iterations)
 
     def _tight(self, found: Missing) -> Subset:
-        return Subset(self.problem, found.functions, found.names)
+        return Subset(self.rooms.of(found).whole, found.functions, found.names)
 
     def _grown(self, found: Missing, apart: bool) -> Missing:
         """Add functions or terms one at a time."""
-        problem = self.apart if apart else self.problem
         # a failed fit cannot be extended
         most = self.policy.most_terms if math.isfinite(found.score) else 0
         while len(found.functions) + len(found.names) < most:
             if apart and heat_of(found.fit) < self.policy.as_noise:
                 # single pieces of flight contain little information on small effects
                 break
+            room = self.rooms.of(found)
+            problem = room.apart if apart else room.whole
             leads = self._leads(problem, found, apart)
             if self.first is None:
                 self.first = leads
@@ -242,7 +257,7 @@ class FreeSearch:
                     break
                 said = spelled(lead.label)
                 self.progress(f"fitting {said}", None)
-                trial = self._with(problem, found, lead, found.score)
+                trial = self.additions.fitted(found, lead, apart, found.score)
                 if trial is not None and not apart:
                     self.tried.append(trial)
                 elif trial is not None and leads is self.first:
@@ -258,18 +273,6 @@ class FreeSearch:
                 break
             found = best
         return found
-
-    def _shows_apart(self, lead: Lead) -> bool:
-        """Return whether disconnected pieces show the effect of a candidate."""
-        if lead.promise is not None:
-            return True
-        if lead.family is not None:
-            return shows_apart(lead.family)
-        acts = self._term(lead.name).acts
-        return Where.FLIGHT in acts or Where.CONTACT in acts
-
-    def _term(self, name: str | None) -> Term:
-        return next(term for term in self.terms if term.name == name)
 
     def _done(self, best: Missing, lead: Lead, first: Lead) -> bool:
         """Return whether the data are explained so well that a candidate need not be
@@ -297,7 +300,8 @@ class FreeSearch:
 
     def _leads(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
         """Return the candidates with a sufficient predicted gain, the best first."""
-        leads = self.leads.ranked(problem, found, apart)
+        driven = self.rooms.driven if self.elements else None
+        leads = self.leads.ranked(problem, found, apart, driven)
         if not leads:
             return []
         least = max(self._least(), self.policy.promising * leads[0].gain)
@@ -306,47 +310,15 @@ class FreeSearch:
             least = max(least, more / heat_of(found.fit))
         return [lead for lead in leads if lead.gain > least][: self.policy.followed]
 
-    def _with(
-        self, problem: Problem, found: Missing, lead: Lead, beaten: float = math.inf
-    ) -> Missing | None:
-        """Return a fit with a candidate, or `None` if it fails.
-
-        **Arguments:** a fit whose cost does not fall below `beaten` may be stopped.
-        """
-        functions, names = found.functions, found.names
-        point, trial = found.fit.point, None
-        if lead.promise is not None:
-            hidden, direct = lead.promise.hidden, lead.promise.direct
-            functions = (*functions, hidden)
-            values = started(problem, point.values, hidden, direct)
-            point = point._replace(values=values)
-        elif lead.family is not None:
-            assert lead.rough is not None
-            functions = (*functions, Free(lead.family, lead.rough, lead.slot))
-            values = emptied(problem, point.values, lead.slot)
-            point = point._replace(values=values)
-        else:
-            assert lead.name is not None
-            names = names | {lead.name}
-        if self._shows_apart(lead):
-            # a force is almost linear if impacts do not connect the pieces
-            subset = Subset(self.apart, functions, names)
-            trial = self.fits.fitted(subset, point, beaten=beaten)
-            point, functions = trial.fit.point, trial.functions
-        if trial is None or problem is not self.apart:
-            if trial is not None and not trial.fit.cost < beaten:
-                return None
-            subset = Subset(problem, functions, names)
-            trial = self.fits.fitted(subset, point, beaten=beaten)
-        return trial if math.isfinite(trial.score) else None
-
     def _swapped(self, found: Missing, share: float = 0.0) -> Missing:
-        problems = (self.problem,) if self.roughly else (self.apart, self.problem)
+        room = self.rooms.of(found)
+        problems = (room.whole,) if self.roughly else room
         return self.left_out.swapped(found, problems, self._small, self.progress, share)
 
     def shuffled(self, found: Missing, seed: int) -> tuple[Shuffled, ...]:
         """Return the gains of the knockoffs of all forces."""
-        return shuffled(self.fits, self.apart, found, self.policy, seed)
+        apart = self.rooms.of(found).apart
+        return shuffled(self.fits, apart, found, self.policy, seed)
 
     def without(self, found: Missing, label: str) -> Missing:
         """Return the fit without the function or term that has the given label."""

@@ -10,8 +10,9 @@ from ...fitting import Problem
 from ..policy import Policy
 from ..terms import Factor, Family, Variable, Where
 from ._blocks import blocks_of
-from ._free_fits import FreeFits, heat_of, heated, Missing, unscaled
+from ._free_fits import FreeFits, Missing
 from ._gains import added_gain
+from ._heat import heat_of, heated, unscaled
 from ._hidden_leads import worthwhile
 from ._hidden_scan import Promise
 from ._hidden_signals import Driven
@@ -46,8 +47,7 @@ class Lead(NamedTuple):
 class Leads:
     """Ranks possible additions to a fit by a quadratic likelihood about it.
 
-    **Arguments:** the fits of subsets, families of functions, the position that drives
-    a force with an internal state (if such forces are sought), names of the possible
+    **Arguments:** the fits of subsets, families of functions, names of the possible
     sensor errors, the policy, and `progress(sentence, fraction)`.
     """
 
@@ -55,26 +55,55 @@ class Leads:
         self,
         fits: FreeFits,
         families: Sequence[Family],
-        driven: Driven | None,
         faults: Sequence[str],
         policy: Policy,
         progress: Callable[[str, float | None], None],
     ):
-        self.fits, self.families, self.driven = fits, tuple(families), driven
+        self.fits, self.families = fits, tuple(families)
         self.faults, self.policy, self.progress = tuple(faults), policy, progress
+        # functions and terms ranked before, with the fit and the problem
+        self._known: list[tuple[Missing, Problem, bool, list[Lead]]] = []
 
-    def ranked(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
+    def ranked(
+        self,
+        problem: Problem,
+        found: Missing,
+        apart: bool,
+        driven: Driven | None = None,
+    ) -> list[Lead]:
         """Return all candidates, the largest gain first; with `apart`, impacts are not
-        used.
+        used. Forces with an internal state are candidates if the position that drives
+        them is given.
         """
-        self.progress("searching the residuals for functions", None)
-        problem = heated(filled(problem, found.functions), heat_of(found.fit))
-        leads = [
-            *self._in_flight(problem, found),
-            *self._elsewhere(problem, found, apart),
-            *self._terms(problem, found),
-        ]
+        leads = self._functions_and_terms(problem, found, apart)
+        if driven is not None and self._has_room(found):
+            leads = [*leads, *self._elements(problem, found, driven)]
         return sorted(leads, key=lambda lead: -lead.gain)
+
+    def _functions_and_terms(
+        self, problem: Problem, found: Missing, apart: bool
+    ) -> list[Lead]:
+        for one, where, alone, leads in self._known:
+            if one is found and where is problem and alone == apart:
+                return leads
+        self.progress("searching the residuals for functions", None)
+        heated_problem = _heated(problem, found)
+        leads = [
+            *self._in_flight(heated_problem, found),
+            *self._elsewhere(heated_problem, found, apart),
+            *self._terms(heated_problem, found),
+        ]
+        self._known.append((found, problem, apart, leads))
+        return leads
+
+    def _elements(
+        self, problem: Problem, found: Missing, driven: Driven
+    ) -> Iterator[Lead]:
+        self.progress("searching for forces with an internal state", None)
+        problem, heat = _heated(problem, found), heat_of(found.fit)
+        response = force_response(problem, found.fit.point, self.fits.free(found))
+        for grown, one in worthwhile(problem, response, driven, self.policy, heat):
+            yield Lead(grown, promise=one)
 
     def _slot(
         self, problem: Problem, found: Missing, where: Where, gap: int = 0
@@ -88,14 +117,12 @@ class Leads:
     def _in_flight(self, problem: Problem, found: Missing) -> Iterator[Lead]:
         slot = self._slot(problem, found, Where.FLIGHT)
         forces = [one for one in self.families if one.where is Where.FLIGHT]
-        forces = forces if slot is not None else []
-        hidden = self.driven is not None and self._has_room(found)
-        if not forces and not hidden:
+        if slot is None or not forces:
             return
         response = force_response(problem, found.fit.point, self.fits.free(found))
         # one family at a time, because all at once would need gigabytes of memory
         leads = [
-            Lead(rough.gain, None, family, rough, slot or "")
+            Lead(rough.gain, None, family, rough, slot)
             for family in forces
             for rough in [self._force(problem, found, family, response)]
         ]
@@ -104,13 +131,6 @@ class Leads:
             bare = not found.functions and not found.names
             first = bare and number < self.policy.followed
             yield self._against_decoy(problem, found, lead, response) if first else lead
-        if hidden and self.driven is not None:
-            self.progress("searching for forces with an internal state", None)
-            heat = heat_of(found.fit)
-            for grown, one in worthwhile(
-                problem, response, self.driven, self.policy, heat
-            ):
-                yield Lead(grown, promise=one)
 
     def _has_room(self, found: Missing) -> bool:
         """Return whether a force with an internal state can be added."""
@@ -188,6 +208,11 @@ class Leads:
             )
             price = len(own) * math.log(problem.samples)
             yield Lead(grown / heat - price, term.name)
+
+
+def _heated(problem: Problem, found: Missing) -> Problem:
+    """Return the problem of a fit with its functions, while the fit may be poor."""
+    return heated(filled(problem, found.functions), heat_of(found.fit))
 
 
 def decoys_of(leads: Sequence[Lead], found: Missing) -> tuple[tuple[str, float], ...]:

@@ -10,8 +10,9 @@ from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import spelled, Term
 from ._blocks import Blocks, blocks_of, moved, values_of
-from ._free_fits import FreeFits, heat_of, Missing, Subset
+from ._free_fits import FreeFits, Missing, Subset
 from ._gains import added_gain, distinct_step, gain
+from ._heat import heat_of
 from ._slots import emptied, filled, Part
 
 
@@ -31,14 +32,18 @@ class Without(NamedTuple):
 class LeftOut:
     """Fits without one of the functions or terms that were found.
 
-    **Arguments:** the fits, the candidate terms, the problem with slots for functions,
-    and the policy.
+    **Arguments:** the fits, the candidate terms, `problem_of(fit)`, which returns the
+    problem with connected pieces to which a fit belongs, and the policy.
     """
 
     def __init__(
-        self, fits: FreeFits, terms: Sequence[Term], problem: Problem, policy: Policy
+        self,
+        fits: FreeFits,
+        terms: Sequence[Term],
+        problem_of: Callable[[Missing], Problem],
+        policy: Policy,
     ):
-        self.fits, self.problem, self.policy = fits, problem, policy
+        self.fits, self.problem_of, self.policy = fits, problem_of, policy
         self.strengths = {t.name: [one.name for one in t.strengths()] for t in terms}
 
     def subset(self, found: Missing, out: Part | str) -> tuple[Subset, Point]:
@@ -46,15 +51,15 @@ class LeftOut:
         slot = "" if isinstance(out, str) else out.slot
         functions = tuple(f for f in found.functions if f.slot != slot)
         names = found.names - {out} if isinstance(out, str) else found.names
-        values = found.fit.point.values
+        values, problem = found.fit.point.values, self.problem_of(found)
         if isinstance(out, str):
-            rows = [self.problem.names.index(name) for name in self.strengths[out]]
+            rows = [problem.names.index(name) for name in self.strengths[out]]
             values = np.asarray(values).copy()
             values[:, rows] = 0.0
         else:
-            values = emptied(self.problem, values, out.slot)
+            values = emptied(problem, values, out.slot)
         point = found.fit.point._replace(values=values)
-        return Subset(self.problem, functions, names), point
+        return Subset(problem, functions, names), point
 
     def predicted_loss(self, found: Missing, out: Part | str) -> float:
         """Return the increase in cost if a function or a term is left out, according to

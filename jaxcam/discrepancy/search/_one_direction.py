@@ -24,14 +24,15 @@ from ..terms import (
     Variable,
     Where,
 )
-from ._earlier import starting_at
-from ._free_fits import heat_of, Missing, Subset
+from ._free_fits import Missing, Subset
 from ._free_search import FreeSearch
 from ._gains import gain, newton_step
+from ._heat import heat_of
 from ._local_force import force_blocks
 from ._named_parts import friction_in_flight
 from ._roughness import Roughness
 from ._slots import Free, replaced, slots_of
+from ._starting_at import starting_at
 from ._trials import Trial, Trials
 
 

@@ -11,7 +11,8 @@ from ...fitting import Problem
 from ..terms import Family, Where
 from ._clock import Clock
 from ._formulas import leaves_noise
-from ._free_fits import FreeFits, heat_of, heated, Missing, Subset
+from ._free_fits import FreeFits, Missing, Subset
+from ._heat import heat_of, heated
 from ._local_force import force_response
 from ._product_forms import ProductSearch, ProductStart
 from ._roughness import Roughness

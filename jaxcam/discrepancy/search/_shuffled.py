@@ -14,7 +14,8 @@ from ...fitting import Problem
 from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Where
-from ._free_fits import FreeFits, heat_of, heated, Missing
+from ._free_fits import FreeFits, Missing
+from ._heat import heat_of, heated
 from ._local_force import force_response, forces_at_nodes, Response
 from ._product_forms import form_at_nodes
 from ._roughness import roughness

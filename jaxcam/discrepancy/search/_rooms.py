@@ -1,0 +1,60 @@
+"""A problem with room for functions, and for an element only in fits that have one."""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ...fitting import Problem
+from ...fitting.engine import separated
+from ..terms import Family, Where
+from ._free_fits import Missing
+from ._hidden_signals import Driven, driven_by
+from ._slots import roomy
+
+
+class Room(NamedTuple):
+    """A problem with disconnected pieces of flight (`apart`), and with connected ones
+    (`whole`).
+    """
+
+    apart: Problem
+    whole: Problem
+
+
+class Rooms:
+    """A problem with room for functions, and the same with room for an element.
+
+    Room for an element makes every fit slower.
+
+    **Arguments:** the problem; families of functions; whether an element may be needed;
+    and whether model errors are allowed for, so that the pieces are hardly connected
+    anyway.
+    """
+
+    def __init__(
+        self, problem: Problem, families: Sequence[Family], element: bool, roughly: bool
+    ):
+        self._problem, self._families, self._roughly = problem, families, roughly
+        unit = families[0].motion_unit
+        # the position that drives an element, if it is measured
+        self.driven = driven_by(problem, unit) if element else None
+        self.plain = self._with(None)
+
+    def _with(self, driven: Driven | None) -> Room:
+        at_impacts = [f for f in self._families if f.where is Where.IMPACT]
+        gaps = sorted({one.constraint for one in at_impacts})
+        whole = roomy(self._problem, self._families[0], gaps, driven)
+        if self._roughly:
+            return Room(whole, whole)
+        return Room(dataclasses.replace(whole, extras=separated(whole.extras)), whole)
+
+    @functools.cached_property
+    def with_element(self) -> Room:
+        """Return the problems with room for an element."""
+        return self._with(self.driven)
+
+    def of(self, found: Missing) -> Room:
+        """Return the problems that have the parameters of a fit."""
+        plain = found.problem.names == self.plain.whole.names
+        return self.plain if plain else self.with_element
