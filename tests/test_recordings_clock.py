@@ -26,6 +26,15 @@ def test_rounded_times_are_put_back_on_their_clock(rate, digits, dropped):
     assert np.max(np.abs(time - true[keep])) < 0.25 * 10.0**-digits
 
 
+@pytest.mark.parametrize("missing", [[500], [2500], [1250, 3750], [800, 2500, 4200]])
+@pytest.mark.parametrize("digits", [3, 6])
+def test_missing_samples_do_not_move_the_others(missing, digits):
+    """A sample every millisecond, written with three digits: the line through all
+    samples is within 0.75 ms of the times, although a few are missing."""
+    time = np.round(np.delete(np.arange(5000) * 1e-3, missing), digits)
+    np.testing.assert_allclose(unrounded(time), time, rtol=0, atol=1e-9)
+
+
 def test_times_that_are_no_even_clock_are_left_alone():
     even = np.arange(2000) * 5e-4
     rng = np.random.default_rng(0)

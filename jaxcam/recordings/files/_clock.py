@@ -14,6 +14,9 @@ _LATEST = 1e6
 # Largest deviation from a clock, in units of the last digit: rounding error of one
 # half, plus the error of the fitted line
 _REACH = 0.75
+# Smallest number of double steps that may be due to rounding alone: fewer missing
+# samples may happen to lie near the line of a uniform clock
+_DOUBLE_STEPS = 8
 
 
 def unrounded(time: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
@@ -33,9 +36,12 @@ def unrounded(time: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         return time
     near = np.abs(steps - usual) < 1.5 * digit
     ticks = np.round(steps / np.mean(steps[near]))
-    # a clock without missing ticks is tried first, because rounding to few digits per
-    # tick has the same effect as missing ticks
-    for counted in (np.ones_like(ticks), np.maximum(ticks, 1.0)):
+    hypotheses = [np.maximum(ticks, 1.0)]
+    if np.sum(ticks > 1) >= _DOUBLE_STEPS:
+        # rounding to about one digit per tick has the same effect as missing ticks, if
+        # these are evenly spaced
+        hypotheses.insert(0, np.ones_like(ticks))
+    for counted in hypotheses:
         place = np.concatenate([[0.0], np.cumsum(counted)])
         even = np.polyval(np.polyfit(place, time, 1), place)
         if np.max(np.abs(even - time)) < _REACH * digit:
