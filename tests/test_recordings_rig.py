@@ -55,7 +55,7 @@ def test_replace(rig):
 @pytest.mark.parametrize(
     "old, new, sentence",
     [
-        ("cam_radius", "cam_radus", "has no `cam_radius`; is `cam_radus` meant?"),
+        ("cam_radius", "cam_radus", "has no `cam_radius`; rename `cam_radus`"),
         ("[impact]", "[impacts]", "unknown key `impacts`; is `impact` meant?"),
         ("value = 0.045", "value = '0.045'", "must be a number"),
         ("value = 0.045", "vale = 0.045", "`cam_radius` in [geometry] has no `value`"),

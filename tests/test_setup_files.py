@@ -217,7 +217,7 @@ def test_a_drive_may_have_an_offset_that_is_fitted(tmp_path):
         ("[channels.position_m]", "[channel.position_m]", "is `channels` meant?"),
         ("[channels.position_m]", "[channels.position_mm]", "call it `position_m`"),
         ("noise = 1e-5", "", "[channels.position_m] has no `noise`; add it."),
-        ("noise = 1e-5", "nois = 1e-5", "has no `noise`; is `nois` meant?"),
+        ("noise = 1e-5", "nois = 1e-5", "has no `noise`; rename `nois`."),
         ("noise = 1e-5", "noise = 0", "is 0, but must be positive"),
         (
             "noise = 1e-5",
@@ -226,7 +226,7 @@ def test_a_drive_may_have_an_offset_that_is_fitted(tmp_path):
         ),
         ("noise = 1e-5", "noise = 1e-5\nresolutoin = 1", "is `resolution` meant?"),
         ('sees = "position"', 'sees = "place"', '"position" or "velocity"'),
-        ('sees = "position"', "", "has no `sees`; add it."),
+        ('sees = "position"', "", "has no `sees`; add it, or remove the table"),
         (
             '[channels.position_m]\nsees = "position"\nnoise = 1e-5',
             "[channels]",

@@ -65,6 +65,12 @@ def _all(tree, key: str):
             "mass = {value = 0.5, tolerance = 0.1, per_record = 3}\n",
             "true or false",
         ),
+        (
+            "mass = 0.5\n",
+            'mass = {value = 500.0, unit = "mm/s^2"}\n',
+            r'SI units; use value = 0.5, unit = "m/s\^2"',
+        ),
+        ("mass = 0.5\n", 'mass = {value = 5.0, unit = "N/mm"}\n', "m, s, rad and N"),
     ],
 )
 def test_values_that_contradict_each_other_are_refused(tmp_path, old, new, said):

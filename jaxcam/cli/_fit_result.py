@@ -19,6 +19,8 @@ from ._saved_system import as_saved
 
 # Standard errors by which a value must exceed its tolerance
 _SURE = 3.0
+# Cost per impact above which a restitution law is not printed
+_CONTRADICTED = 3.0
 # Ratio of rms residual to noise above which the columns may have other units
 _HOPELESS = 1000.0
 # Number of tolerances by which a value must have moved for the same suspicion
@@ -77,12 +79,29 @@ class Result:
                     "two samples; if it is continuous, write `interpolation = "
                     '"linear"` under [input] in the rig file.'
                 )
+        sentence += self._quieter()
         if ratio > _HOPELESS or self._strange(ratio):
             sentence += (
                 " Check the units, the signs and the order of the columns first (deg "
                 "or rad, ms or s, mm or m)."
             )
         return sentence
+
+    def _quieter(self) -> str:
+        """Name the channels whose stated noise is too large."""
+        said = ""
+        for channel in dict.fromkeys(part["channel"] for part in self.quality):
+            parts = [part for part in self.quality if part["channel"] == channel]
+            noise = parts[0]["noise"]
+            rms = math.sqrt(sum(part["rms"] ** 2 for part in parts) / len(parts))
+            if rms < Policy().quieter * noise:
+                said += (
+                    f" The noise of {channel} is stated as {noise:.3g}, but the "
+                    f"residual is only {rms:.3g}: check the unit of the noise, or "
+                    "state the smaller value; otherwise the standard errors are too "
+                    "large."
+                )
+        return said
 
     def _strange(self, ratio: float) -> bool:
         """Return whether a value lies so far from its tolerance, or a poor fit ends so
@@ -197,8 +216,13 @@ def fitted(
         laws = impact_laws(segments, model.system)
     else:
         laws = fitting.restitution_laws(segments)
-    # a law whose fit did not converge means nothing
-    laws = {name: law for name, law in laws.items() if law.converged}
+    # a law means nothing if its fit did not converge, or if the speeds before and after
+    # the impacts, which assume the initial values of the parameters, contradict it
+    laws = {
+        name: law
+        for name, law in laws.items()
+        if law.converged and law.cost_per_impact < _CONTRADICTED
+    }
     again = None
     if bootstrap:
         again = fitting.bootstrap(

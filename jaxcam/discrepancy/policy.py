@@ -129,17 +129,14 @@ class Policy:
     )
     odd_ratio: float = decides(
         10.0,
-        "a recording is inconsistent if its cost per sample is at least this many "
-        "times that of any other recording",
+        "cost per sample of an inconsistent recording, relative to every other one",
     )
     odd_share: float = decides(
         0.05,
         "physics may act in a single recording if this fraction of its values is "
         "outside the range of all others, extended by this fraction at both ends",
     )
-    records_apart: int = decides(
-        4, "minimum number of recordings from which one may be excluded"
-    )
+    records_apart: int = decides(4, "minimum number of recordings to exclude one")
     noisier: float = decides(
         1.2, "ratio of measured to stated noise above which the measured noise is used"
     )
@@ -313,6 +310,9 @@ class Policy:
     )
     decoy: float = shows(
         0.5, "fraction of a function's gain that its decoy may explain without a caveat"
+    )
+    quieter: float = shows(
+        0.5, "ratio of rms residual to stated noise below which a caveat is added"
     )
     units_doubted: float = shows(
         1000.0, "ratio of rms residual to noise above which the units are doubted"

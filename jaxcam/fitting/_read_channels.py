@@ -57,6 +57,11 @@ def _sensor(
     if not isinstance(outer.table[name], dict):
         raise outer.error(name, "is not a table with `sees` and `noise`")
     section = Section(outer.file, name, outer.table, outer.name)
+    if set(section.table) <= {"noise"}:
+        raise RigError(
+            f"{outer.file}: [channels.{printable(name)}] has no `sees`; add it, or "
+            "remove the table if this is the channel of [drive] or [input]."
+        )
     observe = _observed(section, system)
     unit = unit_of(name) or None
     noise = section.positive("noise", unit)

@@ -55,12 +55,15 @@ class RestitutionFit:
     function.
     """
     freedom: int
-    """Number of impacts minus number of parameters; `cost / freedom` is about 1 if the
-    law explains all impacts.
-    """
+    """Number of impacts minus number of parameters."""
     converged: bool
     """Whether the fit ended at an optimum. If not, `values` and `stderr` mean nothing.
     """
+
+    @property
+    def cost_per_impact(self) -> float:
+        """`cost / freedom`: about 1 if the law explains all impacts."""
+        return self.cost / max(1, self.freedom)
 
     def sentence(self) -> str:
         """Return the law in words, and whether its fit failed."""
@@ -68,11 +71,10 @@ class RestitutionFit:
             f"{n} = {v:.5g} +- {e:.1g}"
             for n, v, e in zip(self.names, self.values, self.stderr)
         )
-        ratio = self.cost / max(1, self.freedom)
         name = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self.law).__name__)
         found = (
-            f"{name.capitalize()}: {parts}; the residual is {ratio:.2f} times "
-            f"the noise for {self.freedom + len(self.names)} impacts."
+            f"{name.capitalize()}: {parts}; {self.freedom + len(self.names)} impacts "
+            f"with a cost of {self.cost_per_impact:.2f} each (1 if only noise remains)."
         )
         if self.converged:
             return found

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..recordings.files import known_keys, printable, Section, shown_value
+from ..recordings.files import known_keys, printable, Section, shown_value, si_of
 from .engine import Parameter
 
 
@@ -62,6 +62,7 @@ def stated(section: Section, key: str) -> Stated:
     unit = entry.get("unit", "")
     if not isinstance(unit, str):
         raise section.error(key, f"has the unit {shown_value(unit)}, which is not text")
+    _check_unit(section, key, unit, value)
     own = entry.get("per_record", False)
     if not isinstance(own, bool):
         raise section.error(
@@ -75,3 +76,16 @@ def stated(section: Section, key: str) -> Stated:
             "[records]",
         )
     return Stated(value, float(tolerance), lower, upper, unit, own)
+
+
+def _check_unit(section: Section, key: str, unit: str, value: float) -> None:
+    """Refuse units other than those of SI, to which all channels are converted."""
+    found = si_of(unit)
+    if found is None:
+        return
+    better, factor = found
+    fix = "use units such as m, s, rad and N"
+    if better:
+        fix = f'use value = {value * factor:.6g}, unit = "{better}"'
+    what = f'is given in "{unit}", but all channels are converted to SI units'
+    raise section.error(key, what, fix)

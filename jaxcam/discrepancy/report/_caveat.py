@@ -23,6 +23,7 @@ class Reason(enum.StrEnum):
     ABOVE_NOISE = "above the noise"
     BEYOND_TOLERANCE = "beyond tolerance"
     NOISIER = "noisier than stated"
+    QUIETER = "quieter than stated"
     MODEL_ERROR = "errors of the model"
     UNITS = "units in doubt"
     TIME = "time is over"

@@ -114,18 +114,6 @@ def not_predictive(found: Rejected, functions: str) -> Caveat:
     )
 
 
-def noisier_than_stated(question: Question) -> Iterator[Caveat]:
-    """Return caveats for channels whose stated noise is too small."""
-    for one in question.noisier:
-        yield Caveat(
-            Reason.NOISIER,
-            f"The measured noise of `{one.channel}` is {one.seen:.3g}, "
-            f"{ratio(one.seen / one.stated)} times the stated noise "
-            f"({one.stated:.3g}); "
-            "the larger value was used.",
-        )
-
-
 def model_errors(question: Question, choice: Choice) -> Iterator[Caveat]:
     """Return caveats for a fit that is so poor that errors of the model were allowed
     for.

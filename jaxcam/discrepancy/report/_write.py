@@ -34,7 +34,6 @@ from ._caveats import (
     functions_tie,
     may_differ,
     model_errors,
-    noisier_than_stated,
     not_predictive,
     out_of_time,
     small_remainder,
@@ -50,6 +49,7 @@ from ._effects import (
     with_speed,
 )
 from ._missing import missing_functions, named_function
+from ._stated_noise import noisier_than_stated, quieter_than_stated
 from ._summary import summary_of, summary_of_functions
 from ._units_in_doubt import units_in_doubt
 
@@ -206,6 +206,7 @@ def _of_functions(
 def _of_search(question: Question, trials: Trials, choice: Choice) -> Iterator[Caveat]:
     """Return caveats on the conditions of the search, whatever it found."""
     yield from noisier_than_stated(question)
+    yield from quieter_than_stated(question, choice.fit, trials.policy)
     yield from model_errors(question, choice)
     if choice.rejected is not None:
         found = choice.rejected.functions

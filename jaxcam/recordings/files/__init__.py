@@ -1,7 +1,12 @@
 """Read recordings and rigs from files, with units and precise error messages."""
 
 from .._recording import Case as Case
-from .._units import si as si, unit_of as unit_of, without_unit as without_unit
+from .._units import (
+    si as si,
+    si_of as si_of,
+    unit_of as unit_of,
+    without_unit as without_unit,
+)
 from ._check import check_channels as check_channels, check_drive as check_drive
 from ._choose import Columns as Columns
 from ._mend import mend as mend, Mended as Mended

@@ -102,7 +102,7 @@ class Section:
         if key not in self.table:
             # the key is probably misspelt, so a similar one is suggested
             found = difflib.get_close_matches(key, self.table, n=1)
-            hint = f"; is `{found[0]}` meant?" if found else "; add it."
+            hint = f"; rename `{found[0]}`." if found else "; add it."
             raise RigError(f"{self.file}: [{self.name}] has no `{key}`{hint}")
         entry = self.table[key]
         if not isinstance(entry, dict):
@@ -133,10 +133,10 @@ class Section:
             raise self.error(key, f"has the negative tolerance {tolerance:g}")
         return tolerance
 
-    def error(self, key: str, what: str) -> RigError:
+    def error(self, key: str, what: str, fix: str = "correct it") -> RigError:
         """Return an error to be raised that describes what is wrong with a key."""
         name = printable(key)
-        return RigError(f"{self.file}: `{name}` in [{self.name}] {what}; correct it.")
+        return RigError(f"{self.file}: `{name}` in [{self.name}] {what}; {fix}.")
 
 
 def known_keys(file: Path, place: str, table: dict[str, Any], names) -> None:
