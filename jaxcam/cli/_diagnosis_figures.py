@@ -202,18 +202,22 @@ def _missing(plt, found: Diagnosis):
             color = IMPACT if len(rows) == 1 else plt.cm.viridis(row / len(value))
             label = None
             if len(rows) > 1:
-                label = f"{one.arguments[1]} {one.grid[1][row]:.2g}"
+                second = one.arguments[1]
+                unit = _unit_of(one, second, found.unit)
+                label = f"{second} {one.grid[1][row]:.2g} {unit}".rstrip()
             low, high = value[row] - 2 * error[row], value[row] + 2 * error[row]
             axis.fill_between(along, low, high, color=color, alpha=0.25, lw=0)
             axis.plot(along, value[row], color=color, label=label)
         neutral = 1.0 if one.kind == "restitution" else 0.0
         axis.axhline(neutral, color="k", lw=0.6)
         axis.set_xlabel(labelled(name, _unit_of(one, name, found.unit)))
-        axis.set_ylabel(labelled(one.kind, one.unit.replace("^2", "²")))
+        kind = "factor on the restitution" if one.kind == "restitution" else one.kind
+        axis.set_ylabel(labelled(kind, one.unit.replace("^2", "²")))
         if one.kind == "resonance":
             axis.set_xscale("log")
         if len(rows) > 1:
-            axis.legend(fontsize=8)
+            # beside the axes, where it hides no curve
+            axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
