@@ -199,7 +199,7 @@ def next_experiments(
         if (t.label in slots if isinstance(t, FreeFunction) else t.name in found.names)
         and t.acts
     )
-    system = WithTerms(whole.base, terms, whole.coordinates)
+    system = dataclasses.replace(whole, terms=terms)
     channel, encoder = _encoder(rig, parts)
     states = np.asarray(found.after.point.states)[:, 0]
     made = []

@@ -14,7 +14,7 @@ from ..models import CamFollower
 from ._event_speeds import event_speeds, EVENTS
 from .policy import Policy
 from .report import Diagnosis
-from .terms import system_with_terms, Value, WithTerms
+from .terms import Value, WithTerms
 
 
 # Regularisation of a covariance, relative to unit variance
@@ -148,7 +148,7 @@ def _system(fit: Fit, values: np.ndarray, names, present: bool) -> WithTerms:
         and term.acts
         and not any(one.inner for one in term.strengths())
     )
-    system = system_with_terms(system.base, terms)
+    system = dataclasses.replace(system, terms=terms)
     return jax.tree.map(jnp.asarray, eqx.tree_at(_phase, system, 0.0))
 
 

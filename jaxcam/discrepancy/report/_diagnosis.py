@@ -14,7 +14,6 @@ from ..policy import Policy
 from ..terms import (
     FreeFunction,
     system_with_element,
-    system_with_terms,
     Value,
     Where,
     WithTerms,
@@ -259,7 +258,7 @@ class Diagnosis:
         if drive is not None:
             system = model.uniform(0.0, drive.speed)
         base, pairs = system.base, system.coordinates  # pyright: ignore
-        whole = system_with_terms(base, terms, pairs) if terms else base
+        whole = dataclasses.replace(system, terms=tuple(terms)) if terms else base
         for one in self.missing:
             if one.element is not None:
                 whole = system_with_element(whole, one.element, pairs[0])

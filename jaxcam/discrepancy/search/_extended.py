@@ -21,7 +21,7 @@ from ...fitting.engine import (
     Weights,
 )
 from ..policy import Policy
-from ..terms import system_with_terms, Term, watched, WithTerms
+from ..terms import Term, watched, WithTerms
 
 
 # A step that worsens the fit of a recording is shortened by this factor, and abandoned
@@ -46,7 +46,7 @@ def extended(
     model: Model = eqx.tree_at(
         lambda m: m.system,
         problem.model,
-        system_with_terms(system.base, (*system.terms, *terms), system.coordinates),
+        dataclasses.replace(system, terms=(*system.terms, *terms)),
     )
     model = watched(model)
     own = [p for k, t in enumerate(terms) for p in t.parameters(before + k)]

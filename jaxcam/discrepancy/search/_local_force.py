@@ -6,6 +6,7 @@ therefore predicts the gains of any number of forces, without compiling a progra
 each.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
@@ -32,7 +33,7 @@ from ...fitting.engine import (
 )
 from ...hybrid.programs import program
 from ...parameters import FloatScalar
-from ..terms import Motion, system_with_terms, Term
+from ..terms import Motion, Term
 from ._blocks import Blocks
 
 
@@ -287,11 +288,8 @@ def _linear(
     def model_at(change, start, step):
         model = near.at(change[:size])
         force = LocalForce(change[size:], start, stride * step / 2)
-        system = system_with_terms(
-            model.system.base,
-            (*model.system.terms, force),
-            model.system.coordinates,
-        )
+        terms = *model.system.terms, force
+        system = dataclasses.replace(model.system, terms=terms)
         return eqx.tree_at(lambda m: m.system, model, system)
 
     return linear_pieces(model_at, pieces, extras, states, size + nodes, shown)

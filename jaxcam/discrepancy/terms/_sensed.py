@@ -67,6 +67,6 @@ def own_faults(model: Model, parameters: Sequence[Parameter]) -> list[str]:
 
 
 def _error(system, t, value, slope):
-    motion = Motion(t, value, slope, *drive_at(system.base, t))
+    motion = Motion(t, value, slope, *drive_at(system, t))
     acting = [term for term in system.terms if Where.SENSOR in term.acts]
     return sum(term.sensed(motion) for term in acting)

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 
 from ...hybrid import HybridSystem, SwitchedSystem, SwitchedWrapping
 from ._hidden_elements import HiddenElement
+from ._phase_sense import phase_sense
 from ._term import Term
 from ._with_hidden import WithHidden
 from ._with_terms import WithTerms
@@ -91,9 +92,10 @@ def system_with_terms(
         >>> type(system_with_terms(BilinearOscillator(), ())).__name__
         'SwitchedWithTerms'
     """
+    sense = phase_sense(base, coordinates)
     if isinstance(base, SwitchedSystem):
-        return SwitchedWithTerms(base, tuple(terms), coordinates)
-    return WithTerms(base, tuple(terms), coordinates)
+        return SwitchedWithTerms(base, tuple(terms), coordinates, sense)
+    return WithTerms(base, tuple(terms), coordinates, sense)
 
 
 def system_with_element(

@@ -1,5 +1,7 @@
 """A system with terms for the physics that it may lack."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -28,6 +30,9 @@ class WithTerms(Wrapping):
     """For each coordinate, the state components of the coordinate and of its velocity.
     The force of a term acts on its `coordinate`.
     """
+
+    sense: int = eqx.field(default=0, static=True, metadata={"spare": True})
+    """The result of `phase_sense` for the base."""
 
     @property
     def inner(self) -> HybridSystem:
@@ -59,7 +64,7 @@ class WithTerms(Wrapping):
         moving = field if moving is None else moving
         velocity = state[rate] if moving is None else moving[place]
         pushed = 0.0 if field is None else field[rate]
-        turned = drive_at(self.base, t)
+        turned = drive_at(self, t)
         return Motion(t, state[place], velocity, *turned, state, pushed)
 
     def vector_field(self, t, state) -> jax.Array:
@@ -177,7 +182,7 @@ class WithTerms(Wrapping):
 
     def _raised(self, t, number: int):
         none = jnp.zeros_like(t)
-        motion = Motion(t, none, none, *drive_at(self.base, t))
+        motion = Motion(t, none, none, *drive_at(self, t))
         total = none
         for term in self._acting(Where.CONTACT, number):
             total = total + term.contact(motion)
@@ -195,14 +200,19 @@ class WithTerms(Wrapping):
         ]
 
 
-def drive_at(base, t):
+def drive_at(system: WithTerms, t):
     """Return the angle (rad) and speed (rad/s) of the drive; without a drive, time and
     one.
+
+    The angle of a periodic forcing contains the field `phase` of the base, if there is
+    one.
     """
+    base: Any = system.base
     if hasattr(base, "speed") and hasattr(base, "phase"):
         return base.speed * t + base.phase, base.speed
     if base.period is not None:
-        return 2 * jnp.pi * t / base.period, 2 * jnp.pi / base.period
+        rate = 2 * jnp.pi / base.period
+        return rate * t + (system.sense * base.phase if system.sense else 0.0), rate
     return t, jnp.ones_like(t)
 
 
