@@ -9,6 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from jaxcam.cli import app
+from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.search import segmented, setup_question
 from jaxcam.fitting import read_setup
 from jaxcam.recordings import RigError
 
@@ -41,6 +43,24 @@ def test_phases_are_fitted_for_each_recording(tmp_path):
     for one, phase in zip(own, phases, strict=True):
         off = np.angle(np.exp(1j * (one["value"] - phase)))
         assert abs(off) < 4 * one["stderr"] < 2e-3
+
+
+def test_a_diagnosis_finds_the_phases_first(tmp_path):
+    """Otherwise terms would make up for wrong phases: the start is within 0.05 rad, and
+    the rig file's value remains the nominal one."""
+    phases = (2.0, 2.6)
+    setup = read_setup(driven_wall.write_rig(tmp_path, with_phase(OWN)))
+    case = setup.read_case(driven_wall.write_case(tmp_path / "case", phases))
+    parts = segmented(setup, case, _say_nothing, {})
+    question = setup_question(*parts, (), _say_nothing, Policy())
+    column = question.problem.names.index("phase")
+    off = np.asarray(question.problem.start.values)[:, column] - np.array(phases)
+    assert np.all(np.abs(np.angle(np.exp(1j * off))) < 0.05)
+    assert question.problem.parameter("phase").nominal == 0.0
+
+
+def _say_nothing(sentence, fraction=None):
+    del sentence, fraction
 
 
 def _all(tree, key: str):

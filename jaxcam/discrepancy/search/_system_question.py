@@ -34,6 +34,7 @@ from ..terms import (
 )
 from ._motion_scales import motion_scales
 from ._of_base import channel_of, measured_in, of_base, usual_state, within
+from ._own_values import with_own_values
 from ._question import (
     by_listing,
     Candidates,
@@ -172,6 +173,7 @@ def system_question(
         references = references.sharper(slip / references.slip_speed)
         terms, unlisted = listed(references)
         problem = _with_terms(problem, terms)
+    problem = with_own_values(problem, [one.name for one in inside])
 
     def relisted(question: Question, references: References) -> Question:
         terms, unlisted = listed(references)
