@@ -108,7 +108,10 @@ def test_the_reason_of_a_failed_fit_is_left_to_standard_error(
     for name in ("parameter_table", "correlation_table"):
         monkeypatch.setattr(_fit_result, name, lambda *fit: "table")
     after = SimpleNamespace(
-        converged=converged, message="Reason.", most_correlated=lambda: "a and b"
+        converged=converged,
+        message="Reason.",
+        most_correlated=lambda: "a and b",
+        estimates=("a", "b"),
     )
     found = SimpleNamespace(
         problem=None,
@@ -139,7 +142,8 @@ def _ended(gravity: float, ratio: float, reasons=()):
     estimate = Estimate("gravity", gravity, 0.001, "m/s^2")
     after = SimpleNamespace(estimates=[estimate], reasons=reasons)
     found = _fit_result.Result(problem, (), None, after, None, {}, None)  # pyright: ignore
-    return found, {"record": "a", "channel": "x", "rms": ratio, "ratio": ratio}
+    part = {"record": "a", "channel": "x", "rms": ratio, "noise": 1.0, "ratio": ratio}
+    return found, part
 
 
 @pytest.mark.parametrize(
@@ -173,6 +177,13 @@ def test_a_hopeless_fit_doubts_the_units(gravity, ratio, reasons, said, monkeypa
     found, quality = _ended(gravity, ratio, reasons)
     monkeypatch.setattr(_fit_result.Result, "quality", [quality])
     assert ("deg or rad, ms or s" in found.remainder) == said
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(0.49, True), (0.51, False)])
+def test_a_stated_noise_that_is_too_large_is_said(ratio, said, monkeypatch):
+    found, quality = _ended(9.81, ratio)
+    monkeypatch.setattr(_fit_result.Result, "quality", [quality, quality])
+    assert (f"but the residual is only {ratio:.3g}" in found.remainder) == said
 
 
 def test_the_example_is_written_once(tmp_path, monkeypatch):

@@ -292,7 +292,7 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
         ),
         ("state[0] - self.wall", "float(state[0])", "jnp.where instead of if"),
         ("state[0] - self.wall", "(0.0, 1.0)[state[0].astype(int)]", "jax.numpy"),
-        ("state[0] - self.wall", "1 / 0", "`gap` of Cart fails (ZeroDivision"),
+        ("state[0] - self.wall", "1 / 0", "`gap` of Cart fails (cart.py: line"),
         ("return state[0] - self.wall", "state[0]", "`gap` of Cart returns nothing"),
         (
             "return jnp.stack([state[1], -self.stiffness * state[0]])",
@@ -307,7 +307,7 @@ def test_what_is_wrong_is_said(tmp_path, old, new, words):
         (
             "    teeth",
             "    period = property(lambda self: self.sped)\n    teeth",
-            "`period` of Cart fails (AttributeError",
+            "`period` of Cart fails (cart.py: line",
         ),
         (
             "    teeth",

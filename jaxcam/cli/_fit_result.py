@@ -240,7 +240,8 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
     for sentence in (*notes, *doubts, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))
-    output.print(correlation_table(found.after))
+    if len(found.after.estimates) > 1:
+        output.print(correlation_table(found.after))
     output.print(found.after.most_correlated())
     for sentence in found.outside:
         output.print(sentence)

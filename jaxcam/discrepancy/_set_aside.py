@@ -47,6 +47,16 @@ def cost_by_record(found: Fit) -> dict[str, float]:
     return dict(zip(problem.records, (total / samples).tolist()))
 
 
+def _worst_time(found: Fit, name: str) -> float:
+    """Return the time (s) at which the piece of flight of a recording with the largest
+    cost begins.
+    """
+    row, pieces = found.problem.records.index(name), found.problem.pieces
+    costs = np.asarray(found.costs.flown)[row] + np.asarray(found.costs.joints)[row]
+    costs = np.where(np.asarray(pieces.exists)[row], costs, -np.inf)
+    return float(np.asarray(pieces.flown.start)[row, int(np.argmax(costs))])
+
+
 def visits_own_states(problem: Problem, name: str, policy: Policy) -> bool:
     """Return whether a recording visits states that no other recording visits.
 
@@ -132,8 +142,9 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
         f"The recording {name} {done}: with the model fitted to all recordings, its "
         f"residual is {np.sqrt(costs[name]):.3g} times the noise, whereas that of "
         "every other recording is at most "
-        f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. Check how "
-        f"{name} was recorded and read."
+        f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. It is largest "
+        f"near {_worst_time(found.after, name):.4g} s. Check how {name} was recorded "
+        "and read, and whether an impact or a very low flight was missed there."
     )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

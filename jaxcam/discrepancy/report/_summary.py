@@ -138,7 +138,7 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
         )
     return (
         "No missing physics was detected: with its parameters fitted within their "
-        f"tolerances, the model explains all recordings down to the sensor noise.{tail}"
+        f"tolerances, the model explains the recordings down to the sensor noise.{tail}"
     )
 
 

@@ -148,7 +148,7 @@ def _refuse_broken(file: Path, system: HybridSystem) -> None:
     try:
         _ = system.period
     except Exception as error:
-        raise _failing(file, f"`period` of {name}", error) from error
+        raise _failing(file, f"`period` of {name}", error, system) from error
     at = jnp.zeros(()), jnp.zeros(count)
     # before `vector_field`, which calls `branch`
     if isinstance(system, SwitchedSystem):
@@ -195,7 +195,7 @@ def _shape(file: Path, system: HybridSystem, function: str, *at) -> tuple[int, .
     except NEEDS_VALUES as error:
         raise RigError(f"{file}: {needs_values(name)}.") from error
     except Exception as error:
-        raise _failing(file, name, error) from error
+        raise _failing(file, name, error, system) from error
     if found is None:
         raise RigError(f"{file}: {name} returns nothing; end it with `return`.")
     if not isinstance(found, jax.ShapeDtypeStruct):
@@ -206,5 +206,10 @@ def _shape(file: Path, system: HybridSystem, function: str, *at) -> tuple[int, .
     return found.shape
 
 
-def _failing(file: Path, what: str, error: Exception) -> RigError:
-    return RigError(f"{file}: {what} fails ({fault(error)}); correct it.")
+def _failing(file: Path, what: str, error: Exception, system) -> RigError:
+    """Return an error that names the line of the file with the class."""
+    source = inspect.getsourcefile(type(system))
+    said = fault(error)
+    if source is not None:
+        said = f"{Path(source).name}: {fault(error, Path(source))}"
+    return RigError(f"{file}: {what} fails ({said}); correct it.")
