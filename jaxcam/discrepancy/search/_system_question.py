@@ -143,7 +143,6 @@ def system_question(
     unit, turned = unit_of(seen), system.period is not None
     usual = References.of_speed(fast_speed(runs, seen))
     references = dataclasses.replace(usual, **(stated or {}))
-    clocked = turned or drive is not None
     profiled = turned and moves_surface(system, state)
     # errors of the sensor that the rig fits itself are no missing effects
     taken = fitted_faults(Model(system, dict(sensors), drive), seen, parameters)
@@ -151,19 +150,19 @@ def system_question(
     def listed(references: References):
         if candidates is None or isinstance(candidates, str):
             extended = candidates is not None
+            clocked = turned or drive is not None
             usual = library(turned, references, clocked, extended, profiled)
             offered = [location.of_library(term) for term in _others(usual, taken)]
         else:
             offered = [location.reordered(term, len(pairs)) for term in candidates]
         scales = motion_scales(runs, seen, sensors[seen], references.slip_speed)
-        scaled = [term.scaled(scales) for term in offered]
-        return by_listing(measured_in(unit, scaled))
+        return by_listing(measured_in(unit, [term.scaled(scales) for term in offered]))
 
     terms, unlisted = listed(references)
-    model = watched(
-        Model(system_with_terms(system, terms, pairs), dict(sensors), of_base(drive))
-    )
+    whole = system_with_terms(system, terms, pairs)
+    model = watched(Model(whole, dict(sensors), of_base(drive)))
     inside = [within(parameter) for parameter in parameters]
+    rig = tuple(one.name for one in inside)
     report("preparing the fits", None)
     problem = Problem.build(
         model, recordings, inside + term_parameters(terms, recordings, policy)
@@ -173,7 +172,7 @@ def system_question(
         references = references.sharper(slip / references.slip_speed)
         terms, unlisted = listed(references)
         problem = _with_terms(problem, terms)
-    problem = with_own_values(problem, [one.name for one in inside])
+    problem = with_own_values(problem, rig)
 
     def relisted(question: Question, references: References) -> Question:
         terms, unlisted = listed(references)
@@ -189,7 +188,7 @@ def system_question(
     free = candidates is None or isinstance(candidates, str)
     return Question(
         problem=problem,
-        rig=tuple(p.name for p in inside),
+        rig=rig,
         terms=terms,
         unlisted=unlisted,
         turned=turned,

@@ -14,7 +14,7 @@ from ...hybrid import HybridSystem
 _TIMES = (0.13, 0.61)
 _CHANGE = 0.7
 # Relative difference up to which two values are equal
-_EQUAL = 1e-9
+_ROUNDING = 1e-9
 
 
 def phase_sense(system: HybridSystem, coordinates) -> int:
@@ -55,4 +55,4 @@ def phase_sense(system: HybridSystem, coordinates) -> int:
 
 
 def _close(some: list[np.ndarray], others: list[np.ndarray]) -> bool:
-    return bool(np.allclose(some, others, rtol=_EQUAL, atol=1e-12))
+    return bool(np.allclose(some, others, rtol=_ROUNDING, atol=1e-12))
