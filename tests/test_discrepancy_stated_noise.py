@@ -20,7 +20,12 @@ from jaxcam.discrepancy.report import _stated_noise
 )
 def test_a_residual_below_half_the_noise(rms, errors, said, monkeypatch):
     """The caveat gives the residual, which may be stated as the noise."""
-    parts = [SimpleNamespace(channel="height_m", noise=1.0, rms=one) for one in rms]
+    parts = [
+        SimpleNamespace(channel="height_m", noise=1.0, rms=one, value=[one])
+        for one in rms
+    ]
+    # a recording without samples in flight or contact
+    parts.append(SimpleNamespace(channel="height_m", noise=1.0, value=[]))
     monkeypatch.setattr(_stated_noise, "residuals", lambda found: parts)
     sensors = SimpleNamespace(sensors={"height_m": None})
     found = SimpleNamespace(problem=SimpleNamespace(model=sensors))

@@ -34,8 +34,11 @@ def quieter_than_stated(
     if question.model_errors:
         # the noise was increased
         return
+    every = residuals(found)
     for channel in found.problem.model.sensors:
-        parts = [one for one in residuals(found) if one.channel == channel]
+        parts = [one for one in every if one.channel == channel and len(one.value)]
+        if not parts:
+            continue
         noise = parts[0].noise
         left = float(np.sqrt(np.mean([one.rms**2 for one in parts])))
         if not left < policy.quieter * noise:
