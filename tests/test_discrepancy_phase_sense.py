@@ -38,13 +38,23 @@ class Shaken(HybridSystem):
 @pytest.mark.parametrize("sense", [1, -1])
 def test_the_angle_contains_the_phase_of_the_forcing(sense):
     """To 1e-14, with the sign that the system gives it."""
-    system = system_with_terms(Shaken(sense=sense), ())
+    system = system_with_terms(Shaken(sense=sense), (), state=[0.1, 0.2])
     motion = system.motion(0.2, jnp.zeros(2))
     expected = 2 * np.pi * 3.0 * 0.2 + sense * 0.4
     np.testing.assert_allclose(motion.phase, expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("system", [Shaken(delayed=1.0), BouncingBall()])
+class Named(Shaken):
+    """A system whose `phase` is not a number."""
+
+    phase: str = "of the table"
+    sense: int = 0
+
+    def _angle(self, t):
+        return 2 * jnp.pi * self.frequency * t
+
+
+@pytest.mark.parametrize("system", [Shaken(delayed=1.0), Named(), BouncingBall()])
 def test_a_phase_that_does_not_shift_the_whole_forcing_is_not_used(system):
     """A part of the forcing has another phase; a ball has none."""
-    assert system_with_terms(system, ()).sense == 0
+    assert system_with_terms(system, (), state=[0.1, 0.2]).sense == 0

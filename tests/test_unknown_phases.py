@@ -90,6 +90,16 @@ def _all(tree, key: str):
             'mass = {value = 500.0, unit = "mm/s^2"}\n',
             r'SI units; use value = 0.5, unit = "m/s\^2"',
         ),
+        (
+            "mass = 0.5\n",
+            'mass = {value = 500.0, tolerance = 20.0, lower = 0, unit = "mm"}\n',
+            "use value = 0.5, tolerance = 0.02, lower = 0, unit",
+        ),
+        (
+            "frequency = 4.7\n",
+            'frequency = 4.7\nphase = {value = 30.0, unit = "deg"}\n',
+            'use value = 0.523599, unit = "rad"',
+        ),
         ("mass = 0.5\n", 'mass = {value = 5.0, unit = "N/mm"}\n', "m, s, rad and N"),
     ],
 )

@@ -89,9 +89,9 @@ class Result:
 
     def _quieter(self) -> str:
         """Name the channels whose stated noise is too large."""
-        said = ""
-        for channel in dict.fromkeys(part["channel"] for part in self.quality):
-            parts = [part for part in self.quality if part["channel"] == channel]
+        said, quality = "", [q for q in self.quality if not math.isnan(q["rms"])]
+        for channel in dict.fromkeys(part["channel"] for part in quality):
+            parts = [part for part in quality if part["channel"] == channel]
             noise = parts[0]["noise"]
             rms = math.sqrt(sum(part["rms"] ** 2 for part in parts) / len(parts))
             if rms < Policy().quieter * noise:

@@ -142,9 +142,10 @@ def set_aside(found: Diagnosis, again: Diagnosis, name: str) -> Diagnosis:
         f"The recording {name} {done}: with the model fitted to all recordings, its "
         f"residual is {np.sqrt(costs[name]):.3g} times the noise, whereas that of "
         "every other recording is at most "
-        f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. It is largest "
-        f"near {_worst_time(found.after, name):.4g} s. Check how {name} was recorded "
-        "and read, and whether an impact or a very low flight was missed there."
+        f"{np.sqrt(sorted(costs.values())[-2]):.3g} times the noise. The residual of "
+        f"{name} is largest near {_worst_time(found.after, name):.4g} s. Check how "
+        f"{name} was recorded and read, and whether an impact or a very low flight was "
+        "missed there."
     )
     caveat = Caveat(Reason.SET_ASIDE, sentence)
     return dataclasses.replace(chosen, caveats=(caveat, *chosen.caveats))

@@ -129,7 +129,7 @@ class Policy:
     )
     odd_ratio: float = decides(
         10.0,
-        "cost per sample of an inconsistent recording, relative to every other one",
+        "minimum cost per sample of an inconsistent recording, relative to others",
     )
     odd_share: float = decides(
         0.05,

@@ -16,7 +16,7 @@ from ..recordings.files import (
 )
 from ._read_channels import channel_of, read_sensors
 from ._setup import Setup
-from ._stated import NUMBER, Stated, stated
+from ._stated import check_unit, NUMBER, Stated, stated
 from .engine import Input, INTERPOLATIONS, Model, Turning
 from .own_systems import Field, stated_system, system_class
 
@@ -191,7 +191,9 @@ def _records(
                     name,
                     "is fitted or measured; remove it from [records]",
                 )
-            known_value = inner.quantity(key, None)
+            known_value, entry = inner.quantity(key, None), inner.table[key]
+            if isinstance(entry, dict):
+                check_unit(inner, key, str(entry.get("unit", "")), entry)
             if known_value.tolerance > 0:
                 raise inner.error(
                     name,

@@ -1,7 +1,7 @@
 """Read a number of a rig file, with its tolerance and bounds."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from ..recordings.files import known_keys, printable, Section, shown_value, si_of
@@ -62,7 +62,7 @@ def stated(section: Section, key: str) -> Stated:
     unit = entry.get("unit", "")
     if not isinstance(unit, str):
         raise section.error(key, f"has the unit {shown_value(unit)}, which is not text")
-    _check_unit(section, key, unit, value)
+    check_unit(section, key, unit, entry)
     own = entry.get("per_record", False)
     if not isinstance(own, bool):
         raise section.error(
@@ -78,14 +78,22 @@ def stated(section: Section, key: str) -> Stated:
     return Stated(value, float(tolerance), lower, upper, unit, own)
 
 
-def _check_unit(section: Section, key: str, unit: str, value: float) -> None:
-    """Refuse units other than those of SI, to which all channels are converted."""
+def check_unit(section: Section, key: str, unit: str, entry: Mapping) -> None:
+    """Refuse units other than those of SI, to which all channels are converted.
+
+    **Raises:** `RigError` with the numbers of the entry in SI units.
+    """
     found = si_of(unit)
     if found is None:
         return
     better, factor = found
     fix = "use units such as m, s, rad and N"
     if better:
-        fix = f'use value = {value * factor:.6g}, unit = "{better}"'
+        numbers = [
+            f"{name} = {float(entry[name]) * factor:.6g}"
+            for name in ("value", "tolerance", "lower", "upper")
+            if name in entry
+        ]
+        fix = f'use {", ".join(numbers)}, unit = "{better}"'
     what = f'is given in "{unit}", but all channels are converted to SI units'
     raise section.error(key, what, fix)

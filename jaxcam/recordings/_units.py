@@ -93,16 +93,16 @@ def ending_of(written: str) -> str:
 def si_of(written: str) -> tuple[str, float] | None:
     """Return the SI unit and the conversion factor of a unit as written.
 
-    The unit is empty if one of several factors, as in `N/mm`, is not in SI. A unit that
-    is not known, and one in SI, returns `None`.
+    Both are empty (the factor NaN) if one of several units, as in `N/mm`, is not in SI.
+    A unit that is not known, and one in SI, returns `None`.
     """
     ending = ending_of(written)
     if ending:
         unit = _UNITS[ending]
         return None if unit.factor == 1 else (_UNITS[unit.si].written[0], unit.factor)
-    endings = map(ending_of, re.findall(r"[^\W\d_]+|°", written))
+    endings = map(ending_of, re.findall(r"°?[^\W\d_]+|°", written))
     factors = [_UNITS[one].factor for one in endings if one]
-    return ("", math.prod(factors)) if any(one != 1 for one in factors) else None
+    return ("", math.nan) if any(one != 1 for one in factors) else None
 
 
 def _divided(name: str) -> tuple[str, str]:

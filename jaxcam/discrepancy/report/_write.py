@@ -293,8 +293,11 @@ def _pulls(
         if one.name not in question.rig:
             continue
         place = problem.names.index(one.name)
-        nominal = float(problem.start.values[0, place])
-        size = problem.parameter(one.name).size(nominal)
+        parameter = problem.parameter(one.name)
+        nominal = parameter.nominal
+        if nominal is None:
+            nominal = float(problem.start.values[0, place])
+        size = parameter.size(nominal)
         before, after = within[one.label].value, one.value
         name = _shown_name(question, one.name, one.label)
         found[name] = (before - nominal) / size, (after - nominal) / size

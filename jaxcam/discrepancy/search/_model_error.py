@@ -17,6 +17,7 @@ from ...fitting import Fit, fit, Problem, residuals
 from ...fitting.engine import allowing, FLIGHT, IMPACT, JOINT, Point
 from ..policy import Policy
 from ._given_up import given_up
+from ._own_values import with_own_values
 from ._question import ModelError, Question, with_noise
 
 
@@ -70,6 +71,7 @@ def with_model_error(question: Question, policy: Policy) -> Question | None:
         found.problem.segments,
         [one for one in found.problem.parameters if one.known is None],
     )
+    problem = with_own_values(problem, question.rig)
     problem = dataclasses.replace(problem, extras=allowing(problem.extras, part))
     return dataclasses.replace(
         question, problem=problem, model_errors=errors, looseness=part

@@ -159,7 +159,7 @@ def system_question(
         return by_listing(measured_in(unit, [term.scaled(scales) for term in offered]))
 
     terms, unlisted = listed(references)
-    whole = system_with_terms(system, terms, pairs)
+    whole = system_with_terms(system, terms, pairs, state)
     model = watched(Model(whole, dict(sensors), of_base(drive)))
     inside = [within(parameter) for parameter in parameters]
     rig = tuple(one.name for one in inside)

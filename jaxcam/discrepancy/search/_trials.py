@@ -277,9 +277,12 @@ class Trials:
             return False
         start = np.asarray(self.problem.start.values)[0]
         for name in self.rig:
-            known = self.problem.parameter(name).prior_stderr
-            nominal = start[self.problem.names.index(name)]
-            if abs(found[name].value - nominal) > self.policy.astray_shift * known:
+            one = self.problem.parameter(name)
+            nominal = one.nominal
+            if nominal is None:
+                nominal = start[self.problem.names.index(name)]
+            far = self.policy.astray_shift * one.prior_stderr
+            if abs(found[name].value - nominal) > far:
                 return False
         return True
 

@@ -74,7 +74,7 @@ class SwitchedWithHidden(WithHidden, SwitchedWrapping):
 
 
 def system_with_terms(
-    base: HybridSystem, terms: Sequence[Term], coordinates=((0, 1),)
+    base: HybridSystem, terms: Sequence[Term], coordinates=((0, 1),), state=None
 ) -> WithTerms:
     """Return a system with terms added to it; any switching surfaces are kept.
 
@@ -82,6 +82,9 @@ def system_with_terms(
         base: The system.
         terms: The terms.
         coordinates: As in [`jaxcam.discrepancy.terms.WithTerms`][].
+        state: A state of the motion, `(n,)`, at which it is tested whether the forcing
+            has the field `phase` as its phase; without a state, terms that depend on
+            the phase do not include it.
 
     Returns:
         The system with the terms.
@@ -92,7 +95,7 @@ def system_with_terms(
         >>> type(system_with_terms(BilinearOscillator(), ())).__name__
         'SwitchedWithTerms'
     """
-    sense = phase_sense(base, coordinates)
+    sense = 0 if state is None else phase_sense(base, state)
     if isinstance(base, SwitchedSystem):
         return SwitchedWithTerms(base, tuple(terms), coordinates, sense)
     return WithTerms(base, tuple(terms), coordinates, sense)

@@ -204,8 +204,8 @@ def drive_at(system: WithTerms, t):
     """Return the angle (rad) and speed (rad/s) of the drive; without a drive, time and
     one.
 
-    The angle of a periodic forcing contains the field `phase` of the base, if there is
-    one.
+    The angle of a periodic forcing contains the field `phase` of the base if `sense` is
+    not zero.
     """
     base: Any = system.base
     if hasattr(base, "speed") and hasattr(base, "phase"):

@@ -11,14 +11,14 @@ from ._scalars import forced, Memory, Part
 
 # arrays with more elements than this are kept whole: most of them are tables, of which
 # an operation reads only a few elements
-_LONG = 64
+LONG = 64
 
 
 def split(array) -> np.ndarray:
     """Return an array as a numpy array of scalars."""
     shape = jnp.shape(array)
     out = np.empty(shape, dtype=object)
-    if out.size > _LONG and not isinstance(array, np.ndarray):
+    if out.size > LONG and not isinstance(array, np.ndarray):
         for index in np.ndindex(shape):
             out[index] = Part(array, index)
         return out

@@ -18,7 +18,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import Literal
 
-from ._elements import boxed, join, join_traced, split as split, traced
+from ._elements import boxed, join, join_traced, LONG, split as split, traced
 from ._jaxprs import has_saving_rule, opened, without_unused
 from ._known import computed, is_known, join_known
 from ._moves import moved, MOVES
@@ -178,8 +178,11 @@ def _apply(equation, inputs, memory):
 
 @no_type_check
 def _scattered(equation, inputs, memory):
-    """Return the elements after a scatter at known indices; otherwise `None`."""
-    if not all(is_known(e) for e in inputs[1].ravel()):
+    """Return the elements after a scatter at known indices into a short array;
+    otherwise `None`.
+    """
+    short = inputs[0].size <= LONG
+    if not short or not all(is_known(e) for e in inputs[1].ravel()):
         return None
 
     def combine(name, old, new):

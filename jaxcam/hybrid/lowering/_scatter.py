@@ -19,17 +19,16 @@ COMBINED = {
 
 @no_type_check
 def scattered(combine: Callable, equation, inputs) -> np.ndarray | None:
-    """Return the elements after a scatter, `None` if the scatter is batched.
+    """Return the elements after a scatter, `None` if it applies another operation.
 
     **Arguments:** `combine(name, old, new)`, which applies an operation in `COMBINED`;
     the equation; and its operands as arrays of scalars, the indices being known.
     """
     onto, where, given = inputs
     numbers = equation.params["dimension_numbers"]
-    if numbers.operand_batching_dims or numbers.scatter_indices_batching_dims:
-        return None
-    # without an operation, a new value replaces the old one
     name = COMBINED.get(equation.primitive.name)
+    if name is None and not _replaces(equation.params["update_jaxpr"]):
+        return None
     clips = "CLIP" in str(equation.params["mode"]).upper()
     place_of = functools.partial(
         _place, numbers, where, given.shape, onto.shape, clips=clips
@@ -44,16 +43,26 @@ def scattered(combine: Callable, equation, inputs) -> np.ndarray | None:
 
 
 @no_type_check
+def _replaces(update) -> bool:
+    """Return whether a scatter replaces old values by new ones."""
+    return update is None or update.outvars == update.invars[1:]
+
+
+@no_type_check
 def _place(numbers, where, sizes, shape, index, clips) -> tuple | None:
     """Return the place of an update in the array; `None` if its window is outside."""
     windows = numbers.update_window_dims
-    vector = where[tuple(i for d, i in enumerate(index) if d not in windows)]
-    kept = [d for d in range(len(shape)) if d not in numbers.inserted_window_dims]
+    batch = tuple(i for d, i in enumerate(index) if d not in windows)
+    vector, batched = where[batch], numbers.operand_batching_dims
+    single = (*numbers.inserted_window_dims, *batched)
+    kept = [d for d in range(len(shape)) if d not in single]
     first, offset, spans = [0] * len(shape), [0] * len(shape), [1] * len(shape)
     for d, i in zip(kept, windows, strict=True):
         offset[d], spans[d] = index[i], sizes[i]
     for d, start in zip(numbers.scatter_dims_to_operand_dims, vector, strict=True):
         first[d] = int(start)
+    for d, k in zip(batched, numbers.scatter_indices_batching_dims, strict=True):
+        first[d] = batch[k]
     last = [most - span for most, span in zip(shape, spans, strict=True)]
     if clips:
         first = [min(max(i, 0), most) for i, most in zip(first, last, strict=True)]
