@@ -19,7 +19,7 @@ from ._saved_system import as_saved
 
 # Standard errors by which a value must exceed its tolerance
 _SURE = 3.0
-# Cost per impact above which a restitution law is not printed
+# Reduced cost above which a restitution law is not printed
 _CONTRADICTED = 3.0
 # Ratio of rms residual to noise above which the columns may have other units
 _HOPELESS = 1000.0
@@ -221,7 +221,7 @@ def fitted(
     laws = {
         name: law
         for name, law in laws.items()
-        if law.converged and law.cost_per_impact < _CONTRADICTED
+        if law.converged and law.reduced_cost < _CONTRADICTED
     }
     again = None
     if bootstrap:

@@ -61,7 +61,7 @@ class RestitutionFit:
     """
 
     @property
-    def cost_per_impact(self) -> float:
+    def reduced_cost(self) -> float:
         """`cost / freedom`: about 1 if the law explains all impacts."""
         return self.cost / max(1, self.freedom)
 
@@ -73,8 +73,8 @@ class RestitutionFit:
         )
         name = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self.law).__name__)
         found = (
-            f"{name.capitalize()}: {parts}; {self.freedom + len(self.names)} impacts "
-            f"with a cost of {self.cost_per_impact:.2f} each (1 if only noise remains)."
+            f"{name.capitalize()}: {parts}; {self.freedom + len(self.names)} impacts, "
+            f"reduced cost {self.reduced_cost:.2f} (1 if only noise remains)."
         )
         if self.converged:
             return found

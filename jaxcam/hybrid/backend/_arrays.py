@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..lowering import is_known, join_known, rearranged
+from ..lowering import is_known, join_known, rearranged, replaces
 from ._elementwise import elementwise
 from ._lookup import fill_of, looked_up_in_memory
 from ._writer import Lacking, Writer
@@ -45,6 +45,8 @@ def moved(equation, inputs) -> list[np.ndarray]:
     simple = rearranged(equation, inputs)
     if simple is not None:
         return [simple]
+    if equation.primitive.name == "scatter" and not replaces(equation):
+        raise Lacking("a function applied to elements of an array")
     if equation.primitive.name == "split":
         cuts = np.cumsum(equation.params["sizes"])[:-1]
         return np.split(inputs[0], cuts, axis=equation.params["axis"])

@@ -28,5 +28,9 @@ from ._one_kernel import one_kernel as one_kernel
 from ._packing import pack as pack, Packed as Packed
 from ._scalarise import joined as joined, scalarise as scalarise
 from ._scalars import Memory as Memory
-from ._scatter import COMBINED as COMBINED, scattered as scattered
+from ._scatter import (
+    COMBINED as COMBINED,
+    replaces as replaces,
+    scattered as scattered,
+)
 from ._whole import has_program as has_program, while_loop as while_loop, whole as whole

@@ -27,7 +27,7 @@ def scattered(combine: Callable, equation, inputs) -> np.ndarray | None:
     onto, where, given = inputs
     numbers = equation.params["dimension_numbers"]
     name = COMBINED.get(equation.primitive.name)
-    if name is None and not _replaces(equation.params["update_jaxpr"]):
+    if name is None and not replaces(equation):
         return None
     clips = "CLIP" in str(equation.params["mode"]).upper()
     place_of = functools.partial(
@@ -43,8 +43,11 @@ def scattered(combine: Callable, equation, inputs) -> np.ndarray | None:
 
 
 @no_type_check
-def _replaces(update) -> bool:
-    """Return whether a scatter replaces old values by new ones."""
+def replaces(equation) -> bool:
+    """Return whether a scatter replaces old values by new ones; otherwise, it applies a
+    function to them.
+    """
+    update = equation.params["update_jaxpr"]
     return update is None or update.outvars == update.invars[1:]
 
 
