@@ -115,12 +115,31 @@ def test_a_recording_is_excluded_if_the_others_are_explained(
     """`left`: the cost per sample of the worst of the others."""
     costs = {f"run{k}": 1.0 for k in range(1, 5)}
     monkeypatch.setattr(_set_aside, "cost_by_record", lambda found: found)
+    monkeypatch.setattr(_set_aside, "_worst_time", lambda found, name: 2.2)
     found = _Found(Verdict.UNKNOWN, {**costs, "run5": 100.0})
     again = _Found(Verdict.EFFECT, {**costs, "run1": left})
     chosen = set_aside(found, again, "run5")  # pyright: ignore
     assert chosen.verdict is (Verdict.EFFECT if excluded else Verdict.UNKNOWN)
     (caveat,) = chosen.caveats
     assert ("run5 is excluded" in caveat.sentence) is excluded
+    assert "The residual of run5 is largest near 2.2 s." in caveat.sentence
+
+
+@pytest.mark.usefixtures("unchecked_types")
+def test_the_place_of_the_largest_residual():
+    """The beginning of the piece with the largest cost, joint included, that exists."""
+    pieces = SimpleNamespace(
+        exists=np.array([[True, True, True], [True, True, False]]),
+        flown=SimpleNamespace(start=np.array([[0.0, 1.0, 2.0], [0.5, 1.5, 2.5]])),
+    )
+    problem = SimpleNamespace(records=("run1", "run2"), pieces=pieces)
+    costs = SimpleNamespace(
+        flown=np.array([[5.0, 9.0, 1.0], [5.0, 1.0, 99.0]]),
+        joints=np.array([[0.0, 0.0, 9.5], [0.0, 3.0, 0.0]]),
+    )
+    found = SimpleNamespace(problem=problem, costs=costs)
+    assert _set_aside._worst_time(found, "run1") == 2.0  # pyright: ignore
+    assert _set_aside._worst_time(found, "run2") == 0.5  # pyright: ignore
 
 
 def test_recordings_of_the_same_name_are_refused():
