@@ -29,7 +29,9 @@ class Fitted(dict):
         self.problem = SimpleNamespace(
             parameter=known.get,
             names=names,
-            start=SimpleNamespace(values=np.full((2, len(names)), 0.8)),
+            parameters=tuple(known[name] for name in names),
+            # where a fit begins is not the nominal value
+            start=SimpleNamespace(values=np.full((2, len(names)), 2.0)),
         )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from ...fitting import Fit
+from ...fitting.engine import nominal_of
 from ..evidence import (
     Choice,
     limits,
@@ -293,11 +294,8 @@ def _pulls(
         if one.name not in question.rig:
             continue
         place = problem.names.index(one.name)
-        parameter = problem.parameter(one.name)
-        nominal = parameter.nominal
-        if nominal is None:
-            nominal = float(problem.start.values[0, place])
-        size = parameter.size(nominal)
+        nominal = nominal_of(problem, place)
+        size = problem.parameter(one.name).size(nominal)
         before, after = within[one.label].value, one.value
         name = _shown_name(question, one.name, one.label)
         found[name] = (before - nominal) / size, (after - nominal) / size

@@ -25,8 +25,9 @@ class Additions:
     ) -> Missing | None:
         """Return a fit with a candidate, or `None` if it fails.
 
-        **Arguments:** whether pieces are disconnected; a fit whose cost does not fall
-        below `beaten` may be stopped.
+        **Arguments:** the fit and the candidate; `apart`: whether it is fitted to
+        disconnected pieces of flight; a fit whose cost does not fall below `beaten` may
+        be stopped.
         """
         functions, names = found.functions, found.names
         point, trial, room = found.fit.point, None, self.rooms.of(found)

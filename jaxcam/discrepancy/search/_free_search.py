@@ -77,8 +77,9 @@ class FreeSearch:
         self.additions = Additions(self.fits, self.rooms)
         # unnamed functions must not represent the gain, offset and lag of a sensor
         faults = own_faults(self.problem.model, self.problem.parameters)
+        rooms = self.rooms
         self.left_out = LeftOut(
-            self.fits, self.terms, lambda found: self.rooms.of(found).whole, policy
+            self.fits, self.terms, lambda found: rooms.of(found).whole, policy
         )
         self.leads = Leads(self.fits, self.families, faults, policy, progress)
         both = self.rooms.plain

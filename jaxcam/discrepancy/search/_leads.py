@@ -211,7 +211,9 @@ class Leads:
 
 
 def _heated(problem: Problem, found: Missing) -> Problem:
-    """Return the problem of a fit with its functions, while the fit may be poor."""
+    """Return the problem with the functions of a fit, and with the weight of its priors
+    increased if the fit is poor.
+    """
     return heated(filled(problem, found.functions), heat_of(found.fit))
 
 

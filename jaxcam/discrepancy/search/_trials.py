@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...fitting import Fit, fit, Problem
-from ...fitting.engine import Point
+from ...fitting.engine import nominal_of, Point
 from ..policy import Policy
 from ..terms import Term
 from ._blocks import Blocks, blocks_of
@@ -275,14 +275,10 @@ class Trials:
         """Return whether a fit converged within a few tolerances of the nominal rig."""
         if not found.optimal:
             return False
-        start = np.asarray(self.problem.start.values)[0]
         for name in self.rig:
-            one = self.problem.parameter(name)
-            nominal = one.nominal
-            if nominal is None:
-                nominal = start[self.problem.names.index(name)]
-            far = self.policy.astray_shift * one.prior_stderr
-            if abs(found[name].value - nominal) > far:
+            known = self.problem.parameter(name).prior_stderr
+            nominal = nominal_of(self.problem, self.problem.names.index(name))
+            if abs(found[name].value - nominal) > self.policy.astray_shift * known:
                 return False
         return True
 

@@ -8,6 +8,7 @@ from ._columns import (
     inside as inside,
     invert_information as invert_information,
     linearised as linearised,
+    nominal_of as nominal_of,
     off_nominal as off_nominal,
     prior_cost as prior_cost,
     prior_information as prior_information,

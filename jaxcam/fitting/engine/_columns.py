@@ -96,7 +96,7 @@ def free_columns(problem: Problem, free: Iterable[str] | None) -> Columns:
     local = np.zeros_like(place)
     for column, k in enumerate(picked):
         one = problem.parameters[k]
-        size = one.size(_nominal(problem, k))
+        size = one.size(nominal_of(problem, k))
         local[:, column] = k
         for r in range(records if one.per_record else 1):
             parameter.append(k)
@@ -238,11 +238,12 @@ def off_nominal(problem: Problem, columns: Columns, point: Point):
     """
     values = np.asarray(point.values)
     now = values[np.maximum(columns.record, 0), columns.parameter]
-    nominal = np.array([_nominal(problem, p) for p in columns.parameter])
+    nominal = np.array([nominal_of(problem, p) for p in columns.parameter])
     return (now - nominal) / columns.scale
 
 
-def _nominal(problem: Problem, place: int | np.integer) -> float:
+def nominal_of(problem: Problem, place: int | np.integer) -> float:
+    """Return the nominal value of the parameter with this index."""
     parameter: Parameter = problem.parameters[place]
     if parameter.nominal is not None:
         return parameter.nominal
