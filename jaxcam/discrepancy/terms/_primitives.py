@@ -13,7 +13,7 @@ import numpy as np
 
 MOST_PARTS = 3
 """Largest number of forms in a sum."""
-_EDGE = 0.01
+_EDGE = 0.004
 # Smallest argument of a power, as a fraction of the range, so that its derivatives
 # exist
 _LEAST = 1e-6

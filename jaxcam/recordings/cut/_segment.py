@@ -11,11 +11,13 @@ from .._recording import Case, Recording
 from .._rig import Rig
 from ._cut import cut
 from ._hidden_hops import before_release, may_hop, sure_contact
+from ._impact_points import impact_points, touched_points
 from ._motion import Motion
 from ._placed import placed
 from ._polynomial import measured_noise
 from ._segments import Boundary, Flight, impacts_of, Segments
 from ._surface import Surface
+from ._surface_drift import surface_drifts
 from ._surface_fit import fit_surface, refine_surface
 
 
@@ -56,6 +58,7 @@ def segment_case(
     """
     recordings = tuple(recordings)
     drives = [read_drive(recording) for recording in recordings]
+    drifts: Sequence[np.ndarray | float] = [0.0] * len(recordings)
 
     passes = 1 if surface is not None else _REFINED + 1
     done = 0
@@ -63,8 +66,8 @@ def segment_case(
     def cut_all(surface):
         nonlocal done
         parts = []
-        for recording, drive in zip(recordings, drives):
-            parts.append(_segment_rig(recording, rig, drive, surface, channel))
+        for recording, drive, drift in zip(recordings, drives, drifts):
+            parts.append(_segment_rig(recording, rig, drive, surface, channel, drift))
             done += 1
             if progress is not None:
                 progress(done / (passes * len(recordings)))
@@ -73,9 +76,39 @@ def segment_case(
     if surface is not None:
         return cut_all(surface)
     surface = fit_surface(recordings, rig, drives, channel)
+    noise = rig.sensors.follower_floor
+    seen = [impact_points(*pair, channel, noise) for pair in zip(recordings, drives)]
+    moved = surface_drifts(recordings, drives, surface, seen, noise)
+    if moved is not None:
+        drifts = moved
+        still = [_still(*pair, channel) for pair in zip(recordings, drifts)]
+        surface = fit_surface(still, rig, drives, channel)
     for _ in range(_REFINED):
-        surface = refine_surface(surface, rig, cut_all(surface))
+        parts = cut_all(surface)
+        still = [_on_still(*pair) for pair in zip(parts, drifts)]
+        surface = refine_surface(surface, rig, still)
+        if moved is not None:
+            seen = [touched_points(part) for part in parts]
+            again = surface_drifts(recordings, drives, surface, seen, noise)
+            drifts = again or drifts
     return cut_all(surface)
+
+
+def _still(recording: Recording, drift, channel: str) -> Recording:
+    """Return a recording without the displacement of the surface."""
+    channels = {**recording.channels, channel: recording[channel] - drift}
+    return dataclasses.replace(recording, channels=channels)
+
+
+def _on_still(part: Segments, drift) -> Segments:
+    """Return segments without the displacement of the surface."""
+    time = part.recording.time
+    there = np.interp(part.impacts.time, time, np.broadcast_to(drift, time.shape))
+    return dataclasses.replace(
+        part,
+        recording=_still(part.recording, drift, part.channel),
+        impacts=dataclasses.replace(part.impacts, angle=part.impacts.angle - there),
+    )
 
 
 def segment(
@@ -184,9 +217,13 @@ def _each_sample(name: str, values, recording: Recording) -> Float[np.ndarray, "
         ) from None
 
 
-def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel):
-    contact = surface.angle(drive.angle)
+def _segment_rig(
+    recording, rig: Rig, drive: Drive, surface: Surface, channel, drift=0.0
+):
+    contact = surface.angle(drive.angle) + drift
     rate = surface.slope(drive.angle) * drive.rate
+    if np.ndim(drift):
+        rate = rate + np.gradient(drift, recording.time)
     found = segment(
         recording,
         channel,

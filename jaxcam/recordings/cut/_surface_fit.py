@@ -18,8 +18,7 @@ from ._bend import bend_sizes, Seen, WAVES
 from ._contact_stretches import stretches
 from ._firm_contact import firm_contact
 from ._hidden_hops import pressed
-from ._jump_point import jump_point
-from ._kinks import find_kinks
+from ._impact_points import impact_points
 from ._padding import padded
 from ._surface import (
     linearise,
@@ -189,23 +188,13 @@ def _bend(surface: Surface, rig: Rig, turned, angle, error, ends: list[int]):
 
 def _impact_points(recording, drive, channel, noise, sure):
     """Return cam angle, follower angle and its error at each jump in velocity."""
-    time, samples = recording.time, recording[channel]
-    interval = recording.interval
-    kinks = find_kinks(samples, interval, noise)
-    turned, angle, error = [], [], []
-    for kink in kinks:
-        impact = jump_point(time, samples, kink, interval, noise)
-        if not impact.close:
-            continue
-        turned.append(np.interp(impact.time, time, drive.angle))
-        angle.append(0.5 * (impact.before + impact.after))
-        error.append(impact.stderr)
-    if len(kinks) == 0:
-        # a recording without impacts is either in permanent contact, or gives no
-        # information
-        rows = np.flatnonzero(sure)[::8]
-        return drive.angle[rows], samples[rows], np.full(len(rows), 4 * noise)
-    return np.array(turned), np.array(angle), np.array(error)
+    _, turned, angle, error = impact_points(recording, drive, channel, noise)
+    if len(turned):
+        return turned, angle, error
+    # a recording without impacts is either in permanent contact, or gives no
+    # information
+    rows = np.flatnonzero(sure)[::8]
+    return drive.angle[rows], recording[channel][rows], np.full(len(rows), 4 * noise)
 
 
 def _with_contacts(surface, recording, drive, channel, band, noise, impacts, sure):
