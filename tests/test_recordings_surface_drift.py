@@ -1,4 +1,4 @@
-"""A sensor that drifts, or a cam that rises: the surface moves in the course of time."""
+"""A sensor that drifts, or a cam that rises: the surface moves in time."""
 
 import dataclasses
 import math

@@ -52,9 +52,9 @@ def impact_points(
 def touched_points(part: Segments) -> SurfacePoints:
     """Return the points of the surface at impacts and in contact."""
     time, impacts, noise = part.recording.time, part.impacts, part.noise
-    rows = [
-        np.flatnonzero(part.resting(contact))[::_EVERY] for contact in part.contacts
-    ]
+    assert part.drive is not None
+    rests = [np.flatnonzero(part.resting(contact)) for contact in part.contacts]
+    rows = [rest[::_EVERY] for rest in rests]
     resting = np.concatenate([np.zeros(0, dtype=int), *rows])
     sharp = impacts.time_stderr < 2 * part.recording.interval
     columns = (

@@ -58,7 +58,7 @@ def segment_case(
     """
     recordings = tuple(recordings)
     drives = [read_drive(recording) for recording in recordings]
-    drifts: Sequence[np.ndarray | float] = [0.0] * len(recordings)
+    drifts = [np.zeros(len(recording)) for recording in recordings]
 
     passes = 1 if surface is not None else _REFINED + 1
     done = 0
@@ -103,7 +103,7 @@ def _still(recording: Recording, drift, channel: str) -> Recording:
 def _on_still(part: Segments, drift) -> Segments:
     """Return segments without the displacement of the surface."""
     time = part.recording.time
-    there = np.interp(part.impacts.time, time, np.broadcast_to(drift, time.shape))
+    there = np.interp(part.impacts.time, time, drift)
     return dataclasses.replace(
         part,
         recording=_still(part.recording, drift, part.channel),
@@ -217,13 +217,10 @@ def _each_sample(name: str, values, recording: Recording) -> Float[np.ndarray, "
         ) from None
 
 
-def _segment_rig(
-    recording, rig: Rig, drive: Drive, surface: Surface, channel, drift=0.0
-):
+def _segment_rig(recording, rig: Rig, drive: Drive, surface: Surface, channel, drift):
     contact = surface.angle(drive.angle) + drift
     rate = surface.slope(drive.angle) * drive.rate
-    if np.ndim(drift):
-        rate = rate + np.gradient(drift, recording.time)
+    rate = rate + np.gradient(drift, recording.time)
     found = segment(
         recording,
         channel,

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .._drive import Drive
 from .._recording import Recording
@@ -69,9 +69,9 @@ class _Unknowns(NamedTuple):
             first = last
         return found
 
-    def solved(self, step: float, kept=slice(None)):
+    def solved(self, step: float, kept: Int[np.ndarray, " m"]):
         """Return twice the logarithm of the evidence, apart from a constant, and the
-        most likely coefficients.
+        most likely coefficients, given the points with the indices `kept`.
         """
         prior = self.prior(step)
         inside = self.rows[kept] @ prior
@@ -146,7 +146,7 @@ def _unknowns(
     )
 
 
-def _without_outliers(unknowns: _Unknowns, step: float) -> np.ndarray:
+def _without_outliers(unknowns: _Unknowns, step: float) -> Int[np.ndarray, " m"]:
     """Return the indices of the points near the fit with a flexible displacement."""
     kept = np.arange(len(unknowns.off))
     for _ in range(_PASSES):
