@@ -61,10 +61,9 @@ class FreeSearch:
         self.tried: list[Missing] = []
         # formulas found before, with the fit in which they were sought
         self.formulas: dict[int, tuple[Missing, Missing, list[Missing]]] = {}
-        # candidates for the first function, and the costs of those fitted to single
-        # pieces
+        # candidates for the first function, and the fits of single pieces with them
         self.first: list[Lead] | None = None
-        self.alone: dict[str, float] = {}
+        self.alone: dict[str, Missing] = {}
         self.rooms = Rooms(
             problem, self.families, elements or policy.elements > 0, roughly
         )
@@ -138,9 +137,13 @@ class FreeSearch:
             return renamed if renamed.functions else found
         # a form may score slightly worse than the function that it replaces
         best = min(curve.score, found.score)
+        chosen = curve.functions[0].label
         for lead in self._others():
-            if leaves_noise(self.fits, found, self._small(found)) or self.clock.over:
+            if self.clock.over:
                 break
+            noise = leaves_noise(self.fits, found, self._small(found))
+            if noise and not self._ties(lead.label, chosen):
+                continue
             curve = self._rival_function(bare, lead)
             if curve is None:
                 continue
@@ -179,14 +182,24 @@ class FreeSearch:
         recordings, except those that single pieces of flight rule out.
         """
         fitted = {one.label for trial in self.tried for one in trial.functions}
-        most = self.policy.hopeless_cost * min(self.alone.values(), default=math.inf)
+        costs = {label: one.fit.cost for label, one in self.alone.items()}
+        most = self.policy.hopeless_cost * min(costs.values(), default=math.inf)
         return [
             lead
             for lead in self.first or []
             if lead.family is not None
             and lead.label not in fitted
-            and self.alone.get(lead.label, 0.0) <= most
+            and costs.get(lead.label, 0.0) <= most
         ]
+
+    def _ties(self, label: str, chosen: str) -> bool:
+        """Return whether single pieces of flight do not distinguish a function from the
+        chosen one.
+        """
+        if label not in self.alone or chosen not in self.alone:
+            return False
+        one, other = self.alone[label], self.alone[chosen]
+        return abs(one.score - other.score) < self.policy.tie * heat_of(other.fit)
 
     def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
         """Return the fit with another function alone, or `None` if it fails.
@@ -262,7 +275,7 @@ class FreeSearch:
                 if trial is not None and not apart:
                     self.tried.append(trial)
                 elif trial is not None and leads is self.first:
-                    self.alone[lead.label] = trial.fit.cost
+                    self.alone[lead.label] = trial
                 if trial is not None and trial.score < best.score:
                     best = trial
             grown = found.score - best.score
