@@ -35,8 +35,9 @@ def _value(one, numbers):
     ids=lambda one: one.name,
 )
 def test_a_form_keeps_its_values_over_another_range(form):
-    """To 2 % of its largest value: edges are smoothed over a hundredth of the range, so
-    that a jump is a little steeper over a smaller one."""
+    """To 2 % of its largest value: edges are smoothed over a fraction of the range, so
+    that a jump is a little steeper over a smaller one.
+    """
     numbers = np.array([0.7, *(one[len(one) // 2] for one in form.starts)])
     numbers[list(form.places)] = np.linspace(0.4, 0.6, len(form.places))
     before = Free(WIDE, Roughness(), "force_a", form)

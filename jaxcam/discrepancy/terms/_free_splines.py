@@ -7,8 +7,7 @@ from jaxtyping import Array, Float
 from ._primitives import MOST_NUMBERS, MOST_PARTS, Place, Primitive, PRIMITIVES
 
 
-# Knots of the spline that represents a function: two per edge of a form, which is
-# smoothed over a hundredth of the range
+# Number of knots of the spline that represents a function
 _KNOTS = 332
 # The spline continues beyond either end by this fraction of the range
 BEYOND = 0.15

@@ -1,8 +1,8 @@
 """Parametric forms that may replace a free function.
 
 A form is a function of a phase, or of `u`, the argument as a fraction of the range
-visited; its first parameter is its size. Edges are smoothed over a hundredth of the
-range, so that a fit can move them.
+visited; its first parameter is its size. Edges are smoothed, so that a fit can move
+them.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,6 +13,8 @@ import numpy as np
 
 MOST_PARTS = 3
 """Largest number of forms in a sum."""
+# Half-width over which edges are smoothed, as a fraction of the range: the distance
+# between two knots of the spline that represents a form
 _EDGE = 0.004
 # Smallest argument of a power, as a fraction of the range, so that its derivatives
 # exist
