@@ -25,6 +25,7 @@ NUMBERS = {
     "cube": (-2.0,),
     "exponential": (0.5, 3.0),
     "power": (0.6, 2.2),
+    "settling": (0.6, 3.0),
     "wave": (0.7, 2.3, 0.4),
     "forward": (0.6,),
     "backward": (0.6,),

@@ -42,15 +42,17 @@ from ._location import (
 )
 from ._motion_scales import MotionScales as MotionScales
 from ._moving_surface import moves_surface as moves_surface
+from ._parametric_form import (
+    MOST_PARTS as MOST_PARTS,
+    Place as Place,
+    Primitive as Primitive,
+    sum_of as sum_of,
+)
 from ._primitives import (
     BACKWARD as BACKWARD,
     DRY as DRY,
     FORWARD as FORWARD,
-    MOST_PARTS as MOST_PARTS,
-    Place as Place,
-    Primitive as Primitive,
     PRIMITIVES as PRIMITIVES,
-    sum_of as sum_of,
 )
 from ._products import Gate as Gate, GATE_PLACES as GATE_PLACES
 from ._scaled import ScaledTerm as ScaledTerm

@@ -9,13 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._parametric_form import Primitive
 from ._primitives import (
     FROM_ZERO,
     OF_PHASE,
     OF_SPEED,
+    OF_TIME,
     ON_A_LINE,
     ONLY_IN_SUMS,
-    Primitive,
     STRAIGHT,
 )
 from ._shapes import Variable
@@ -106,7 +107,9 @@ class Family:
         if self.where is Where.SENSOR and self.argument is not Variable.TIME:
             # without a straight line, because gain and lag of a sensor are named terms
             return tuple(one for one in ON_A_LINE if one is not STRAIGHT)
-        if self.argument in (Variable.TIME, Variable.APPROACH):
+        if self.argument is Variable.TIME:
+            return (*ON_A_LINE, *FROM_ZERO, *OF_TIME)
+        if self.argument is Variable.APPROACH:
             return (*ON_A_LINE, *FROM_ZERO)
         return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
 

@@ -17,7 +17,8 @@ from jaxtyping import Array, Bool, Float
 from ...fitting import Parameter
 from ._families import Factor, Family
 from ._free_splines import BEYOND, interpolated, knots_of, splines
-from ._primitives import MOST_PARTS, Primitive, PRIMITIVES
+from ._parametric_form import MOST_PARTS, Primitive
+from ._primitives import PRIMITIVES
 from ._products import Gate, GATE_PLACES
 from ._shapes import Variable
 from ._term import Motion, Term, terms_of

@@ -4,7 +4,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ._primitives import MOST_NUMBERS, MOST_PARTS, Place, Primitive, PRIMITIVES
+from ._parametric_form import MOST_PARTS, Place, Primitive
+from ._primitives import MOST_NUMBERS, PRIMITIVES
 
 
 # Number of knots of the spline that represents a function

@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 from ._families import Family
-from ._primitives import MOST_NUMBERS, Primitive
+from ._parametric_form import Primitive
+from ._primitives import MOST_NUMBERS
 
 
 GATE_PLACES = tuple(range(MOST_NUMBERS, 2 * MOST_NUMBERS - 1))
