@@ -137,7 +137,7 @@ class FreeSearch:
             return renamed if renamed.functions else found
         # a form may score slightly worse than the function that it replaces
         best = min(curve.score, found.score)
-        chosen = curve.functions[0].label
+        chosen = next(one.label for one in curve.functions)
         for lead in self._others():
             if self.clock.over:
                 break
