@@ -5,9 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ..hybrid.lowering import used_inputs
 from ..hybrid.programs import program
 from ..recordings.cut import Drive, padded, saturated
 from ._gap_rates import gap_rates
+from ._gaps_at_impacts import fitted_to_impacts, gap_points, GapPoints
 from .engine import (
     DriveState,
     Layout,
@@ -19,6 +21,8 @@ from .engine import (
 
 # Number of samples at which the dependence of a gap on the state is evaluated
 _LOOKS = 64
+# Largest error of a gap that is fitted to impacts, in standard deviations
+_SURE = 3.0
 
 
 def measured_states(model: Model, picks, recording) -> Float[np.ndarray, "k n"]:
@@ -38,6 +42,9 @@ def measured_gaps(
     """Return the gaps `(g, k)`, the largest magnitudes of their derivatives with
     respect to the state `(g, n)`, their errors `(g,)`, and for each its measured rate
     of change `(k,)` or `None`.
+
+    If the surfaces move, and their parameters are uncertain, the gaps are those that
+    vanish at the impacts.
     """
     layout = Layout(model, parameter_places(model, parameters))
     values = np.array([float(p.where(model)) for p in parameters])
@@ -49,21 +56,62 @@ def measured_gaps(
         else (drive.angle, drive.rate, drive.acceleration.values)
     )
     columns = [padded(part) for part in (recording.time, states, *moving)]
-    gaps = np.asarray(_gap(layout, values, *columns))[:count].T
     rows = np.linspace(0, count - 1, _LOOKS).astype(int)
     looks = [part[rows] for part in columns]
-    by_state, by_value = (np.asarray(x) for x in _slopes(layout, values, *looks))
-    slopes = np.max(np.abs(by_state), axis=0)
-    moved = np.max(np.abs(by_value), axis=0)
+
+    def gaps_and_slopes(values):
+        gaps = np.asarray(_gap(layout, values, *columns))[:count].T
+        return gaps, *(np.asarray(x) for x in _slopes(layout, values, *looks))
+
+    gaps, by_state, by_value = gaps_and_slopes(values)
     # a parameter that does not affect a gap and has no tolerance must not give zero
     # times infinity
+    moved = np.max(np.abs(by_value), axis=0, initial=0.0)
     parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
+    errors = np.sum(parts, axis=-1)
+    if _moves(layout.at(jnp.asarray(values)), states) and np.any(errors > 0):
+        points = gap_points(recording.time, gaps, errors, recording.interval)
+        at = _at_points(layout, points, (recording.time, states, *moving))
+        found = fitted_to_impacts(points, at, values, tolerances)
+        if found is not None:
+            values = found.values
+            gaps, by_state, by_value = gaps_and_slopes(values)
+            spread = np.einsum("kgp,pq,kgq->kg", by_value, found.covariance, by_value)
+            errors = np.minimum(_SURE * np.sqrt(np.max(spread, axis=0)), errors)
+    slopes = np.max(np.abs(by_state), axis=0)
     rates: list = [None] * len(gaps)
     clear = [k for k, name in picks.items() if not np.any(saturated(recording[name]))]
     if len(picks) > 1:
         found = gap_rates(layout, values, tuple(columns), tuple(looks), clear)
         rates = [None if rate is None else rate[:count] for rate in found]
-    return gaps, slopes, np.sum(parts, axis=-1), rates
+    return gaps, slopes, errors, rates
+
+
+def _moves(model: Model, states) -> bool:
+    """Return whether a gap of a model depends on time."""
+    state = jnp.zeros(states.shape[1])
+    closed = jax.make_jaxpr(model.system.gap)(jnp.zeros(()), state)
+    return used_inputs(closed)[0]
+
+
+def _at_points(layout: Layout, points: GapPoints, columns):
+    """Return a function that maps values of the parameters to the gaps at impacts
+    `(i,)`, and to their derivatives `(i, p)`.
+    """
+    time, count = columns[0], len(points.time)
+    at = [points.time]
+    for column in columns[1:]:
+        flat = column.reshape(len(time), -1).T
+        seen = np.stack([np.interp(points.time, time, own) for own in flat], axis=-1)
+        at.append(seen.reshape(count, *column.shape[1:]))
+    at = [padded(part) for part in at]
+    each = np.arange(count), points.gap
+
+    def gaps_of(values):
+        _, by_value = _slopes(layout, values, *at)
+        return np.asarray(_gap(layout, values, *at))[each], np.asarray(by_value)[each]
+
+    return gaps_of
 
 
 @program

@@ -6,7 +6,11 @@ from ._fast_speed import (
     fast_speed as fast_speed,
     usual_acceleration as usual_acceleration,
 )
-from ._gaps import given_contacts as given_contacts, segment_gaps as segment_gaps
+from ._gaps import (
+    gap_jumps as gap_jumps,
+    given_contacts as given_contacts,
+    segment_gaps as segment_gaps,
+)
 from ._given_impacts import GivenImpact as GivenImpact, GivenImpacts as GivenImpacts
 from ._oscillation import (
     hides_kinks as hides_kinks,

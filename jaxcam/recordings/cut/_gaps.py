@@ -12,7 +12,7 @@ from ._gap_rate import GapRate
 from ._given_impacts import given_places, GivenImpacts
 from ._inside import refuse_inside
 from ._motion import Motion
-from ._placed import placed
+from ._placed import jump_gaps, JumpGaps, placed
 from ._polynomial import measured_noise
 from ._segments import Segments
 
@@ -80,6 +80,14 @@ def given_contacts(
     """
     sides = _sides(recording, gaps, tolerances, None, given)
     return sorted(given_places(sides, given)[0])
+
+
+def gap_jumps(
+    time: Float[np.ndarray, " k"], gap: Float[np.ndarray, " k"], interval: float
+) -> JumpGaps:
+    """Return the jumps in the rate of change of a gap, given at every sample."""
+    none = np.zeros(len(time))
+    return jump_gaps(Motion(time, gap, none, none, measured_noise(gap), interval))
 
 
 def _sides(recording, gaps, tolerances, rates, given) -> list[Motion]:

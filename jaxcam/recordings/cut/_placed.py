@@ -1,9 +1,10 @@
 """Shift a surface to the observed impacts, within its tolerance."""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ._jump_point import jump_point
 from ._motion import Motion
@@ -11,6 +12,17 @@ from ._motion import Motion
 
 # Impacts further from the median position than this many standard errors are ignored
 _OUTLIER = 5.0
+
+
+class JumpGaps(NamedTuple):
+    """For each jump in velocity, `(j,)`: its time (s), the gap at which the motions
+    before and after it meet, its standard error, and whether they meet near the jump.
+    """
+
+    time: Float[np.ndarray, " j"]
+    gap: Float[np.ndarray, " j"]
+    error: Float[np.ndarray, " j"]
+    close: Bool[np.ndarray, " j"]
 
 
 def placed(motion: Motion, tolerance: float) -> Motion:
@@ -24,15 +36,20 @@ def placed(motion: Motion, tolerance: float) -> Motion:
 
     **Returns:** the unchanged motion if no jump is within the tolerance.
     """
-    time, samples = motion.time, motion.samples
-    found = []
+    found = jump_gaps(motion)
+    near = np.abs(found.gap) < tolerance + _OUTLIER * found.error
+    return shifted(motion, found.gap[near], found.error[near], tolerance)
+
+
+def jump_gaps(motion: Motion) -> JumpGaps:
+    """Return the gaps at the jumps in velocity, at which the motion meets a surface."""
+    time, rows = motion.time, []
     for kink in motion.jumps():
-        impact = jump_point(time, samples, kink, motion.interval, motion.noise)
-        off = impact.before - np.interp(impact.time, time, motion.contact)
-        if abs(off) < tolerance + _OUTLIER * impact.stderr:
-            found.append((off, impact.stderr))
-    off, error = np.array(found).reshape(-1, 2).T
-    return shifted(motion, off, error, tolerance)
+        found = jump_point(time, motion.samples, kink, motion.interval, motion.noise)
+        off = found.before - np.interp(found.time, time, motion.contact)
+        rows.append((found.time, off, found.stderr, found.close))
+    moment, off, error, close = np.array(rows, dtype=float).reshape(-1, 4).T
+    return JumpGaps(moment, off, error, close.astype(bool))
 
 
 def shifted(

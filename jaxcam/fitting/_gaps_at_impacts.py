@@ -1,0 +1,143 @@
+"""Fit moving surfaces to the impacts of a recording, before it is segmented.
+
+Impacts are found as jumps in velocity, without the surfaces, and the gaps must vanish
+there. This determines, for example, the phase of a shaken table in a recording in which
+the phase is unknown.
+"""
+
+import itertools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.optimize import least_squares
+
+from ..recordings.cut import gap_jumps
+
+
+# Number of values, spread evenly over the tolerance, from which the most influential
+# parameter starts, and of starts that are refined
+_VALUES, _REFINED = 24, 3
+# An impact lies on the surface if its gap is at most this number of standard errors
+_ON, _USUAL = 5.0, 2.0
+# Minimum fraction of the impacts that must lie on the surfaces, and minimum number of
+# them in addition to that of the parameters
+_MOST, _MORE = 0.7, 3
+# Jumps of several gaps within this number of sampling intervals are the same jump
+_SAME = 3
+# A tolerance is half the width of a uniform distribution with this standard deviation
+_UNIFORM = np.sqrt(3.0)
+
+
+class GapPoints(NamedTuple):
+    """Impacts: time (s), the gap that closed, its value there with the nominal
+    parameters, and its standard error, `(i,)` each.
+    """
+
+    time: Float[np.ndarray, " i"]
+    gap: Int[np.ndarray, " i"]
+    off: Float[np.ndarray, " i"]
+    error: Float[np.ndarray, " i"]
+
+
+class FittedValues(NamedTuple):
+    """Values of the parameters `(p,)`, and their covariance `(p, p)`."""
+
+    values: Float[np.ndarray, " p"]
+    covariance: Float[np.ndarray, "p p"]
+
+
+def gap_points(
+    time: Float[np.ndarray, " k"],
+    gaps: Float[np.ndarray, "g k"],
+    errors: Float[np.ndarray, " g"],
+    interval: float,
+) -> GapPoints:
+    """Return the impacts in a recording.
+
+    A jump in velocity belongs to the gap that is closest to zero, relative to its
+    error; it is ignored if no gap can be zero there.
+
+    **Arguments:** the gaps at the samples, and the largest errors of the gaps.
+    """
+    rows = []
+    for k, (gap, error) in enumerate(zip(gaps, errors, strict=True)):
+        jumps = gap_jumps(time, gap, interval)
+        near = np.abs(jumps.gap) < error + _ON * jumps.error
+        for i in np.flatnonzero(jumps.close & near):
+            rows.append((jumps.time[i], k, jumps.gap[i], jumps.error[i]))
+    rows.sort()
+    best: list[tuple] = []
+    for row in rows:
+        if not best or row[0] - best[-1][0] > _SAME * interval:
+            best.append(row)
+        elif abs(row[2]) / row[3] < abs(best[-1][2]) / best[-1][3]:
+            best[-1] = row
+    moment, gap, off, stderr = np.array(best, dtype=float).reshape(-1, 4).T
+    return GapPoints(moment, gap.astype(int), off, stderr)
+
+
+def fitted_to_impacts(
+    points: GapPoints,
+    gaps_of: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+    nominal: Float[np.ndarray, " p"],
+    tolerances: Float[np.ndarray, " p"],
+) -> FittedValues | None:
+    """Return the parameters with which the gaps vanish at the impacts, or `None` if
+    there are no such parameters, or if the impacts do not determine them.
+
+    **Arguments:** `gaps_of(values)` returns the gap at each impact, `(i,)`, and its
+    derivatives with respect to the parameters, `(i, p)`; `tolerances` limit the change
+    of the parameters.
+    """
+    start, slopes = gaps_of(nominal)
+    reach = np.max(np.abs(slopes), axis=0, initial=0.0)
+    moving = np.flatnonzero((reach > 0) & (tolerances > 0))
+    if not len(moving) or len(points.time) < len(moving) + _MORE:
+        return None
+    scale = np.where(np.isfinite(tolerances), tolerances, 1.0)[moving]
+    known = np.where(np.isfinite(tolerances[moving]), _UNIFORM, 0.0)
+
+    def values_of(steps):
+        values = nominal.copy()
+        values[moving] += scale * steps
+        return values
+
+    def misfits(steps):
+        gap, _ = gaps_of(values_of(steps))
+        return np.append((gap - start + points.off) / points.error, known * steps)
+
+    def rates(steps):
+        _, slopes = gaps_of(values_of(steps))
+        own = slopes[:, moving] * scale / points.error[:, None]
+        return np.concatenate([own, np.diag(known)])
+
+    def robust(steps):
+        return float(np.sum(np.sqrt(1 + misfits(steps) ** 2)))
+
+    first = int(np.argmax(reach[moving] * scale))
+    shares = (2 * np.arange(_VALUES) + 1) / _VALUES - 1
+    trials = [
+        np.zeros(len(moving)),
+        *(share * np.eye(len(moving))[first] for share in shares),
+    ]
+    trials.sort(key=robust)
+    best = min(
+        (
+            least_squares(misfits, trial, jac=rates, loss="soft_l1")  # pyright: ignore
+            for trial in itertools.islice(trials, _REFINED)
+        ),
+        key=lambda one: one.cost,
+    )
+    count = len(points.time)
+    off = np.abs(misfits(best.x)[:count])
+    usual = float(np.median(off))
+    if usual > _USUAL or np.mean(off < _ON) < _MOST:
+        return None
+    kept = np.append(off < _ON, np.ones(len(moving), dtype=bool))
+    rows = rates(best.x)[kept]
+    inverse = np.linalg.pinv(rows.T @ rows)
+    covariance = np.zeros((len(nominal), len(nominal)))
+    covariance[np.ix_(moving, moving)] = inverse * np.outer(scale, scale)
+    return FittedValues(values_of(best.x), covariance)

@@ -1,0 +1,123 @@
+"""A ball on a shaken table whose phase is unknown: the impacts determine it."""
+
+import functools
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcam
+from jaxcam.fitting import Model, Parameter, segment_by_model, Sensor
+from jaxcam.fitting._gaps_at_impacts import fitted_to_impacts, gap_points, GapPoints
+from jaxcam.hybrid import HybridSystem
+from jaxcam.recordings import Recording
+
+
+NOISE = 2e-5
+# frequency (rad/s), phase (rad): one that rests on the table, and a bouncing one
+RUNS = ((60.0, 0.05), (75.0, -1.5632))
+
+
+def _number(value) -> jax.Array:
+    return eqx.field(converter=jnp.asarray, default=value)
+
+
+class Shaken(HybridSystem):
+    """Height and velocity of a ball above a table that moves up and down."""
+
+    state_names = ("height", "velocity")
+    amplitude: jax.Array = _number(0.004)
+    omega: jax.Array = _number(60.0)
+    phase: jax.Array = _number(0.0)
+    restitution: jax.Array = _number(0.63)
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], -9.81])
+
+    def gap(self, t, state):
+        return state[0] - self.amplitude * jnp.sin(self.omega * t + self.phase)
+
+    def impact(self, t, state):
+        rate = self.amplitude * self.omega * jnp.cos(self.omega * t + self.phase)
+        return jnp.stack([state[0], rate - self.restitution * (state[1] - rate)])
+
+
+PARAMETERS = (
+    Parameter("amplitude", lambda m: m.system.amplitude, tolerance=2e-4),
+    Parameter("phase", lambda m: m.system.phase, tolerance=3.2, per_record=True),
+)
+
+
+@functools.cache
+def measured(omega, phase):
+    table = Shaken(omega=omega, phase=phase, amplitude=0.00408)
+    run = jaxcam.simulate(table, [0.03, 0.0], 0.0, 2.0)
+    time = np.arange(0.0, 2.0, 5e-4)
+    rng = np.random.default_rng(3)
+    height = np.asarray(run.at(time))[:, 0] + NOISE * rng.standard_normal(len(time))
+    return run, Recording(f"{omega:g}", time, {"height_m": height})
+
+
+def gaps_of(run: Recording, omega, points: GapPoints):
+    """Gap at each impact, and its derivatives by amplitude and phase."""
+    height = np.interp(points.time, run.time, run["height_m"])
+
+    def found(values):
+        angle = omega * points.time + values[1]
+        slopes = [-np.sin(angle), -values[0] * np.cos(angle)]
+        return height - values[0] * np.sin(angle), np.stack(slopes, axis=-1)
+
+    return found
+
+
+@pytest.mark.parametrize(("omega", "phase"), RUNS)
+def test_impacts_determine_the_phase(omega, phase):
+    """To 0.02 rad and 1 % of the amplitude, and to four standard deviations."""
+    _, run = measured(omega, phase)
+    nominal, tolerances = np.array([0.004, 0.0]), np.array([2e-4, 3.2])
+    gap = run["height_m"] - 0.004 * np.sin(omega * run.time)
+    points = gap_points(run.time, gap[None], np.array([0.013]), run.interval)
+    found = fitted_to_impacts(points, gaps_of(run, omega, points), nominal, tolerances)
+    assert found is not None
+    off = found.values - [0.00408, phase]
+    assert np.all(np.abs(off) < [4e-5, 0.02])
+    assert np.all(np.abs(off) < 4 * np.sqrt(np.diag(found.covariance)))
+
+
+def test_impacts_elsewhere_determine_nothing():
+    """Heights that no phase explains."""
+    rng = np.random.default_rng(5)
+    time = np.sort(rng.uniform(0.0, 2.0, 30))
+    run = Recording("none", time, {"height_m": rng.uniform(-0.004, 0.004, 30)})
+    points = GapPoints(time, np.zeros(30, int), run["height_m"], np.full(30, NOISE))
+    at = gaps_of(run, 60.0, points)
+    assert (
+        fitted_to_impacts(points, at, np.array([4e-3, 0]), np.array([2e-4, 3])) is None
+    )
+
+
+@pytest.mark.parametrize(("omega", "phase"), RUNS)
+def test_impacts_and_rests_are_found(omega, phase):
+    """With the phase 0 in the model, all impacts faster than 0.15 m/s are found at
+    their times, to two sampling intervals, and so are rests of more than 10 ms.
+    """
+    truth, run = measured(omega, phase)
+    model = Model(Shaken(omega=omega), {"height_m": Sensor(0, noise=NOISE)})
+    (part,) = segment_by_model(model, [run], PARAMETERS)
+    count = int(truth.impacts.count)
+    time = np.asarray(truth.impacts.time)[:count]
+    angle = omega * time + phase
+    rate = 0.00408 * omega * np.cos(angle)
+    fast = rate - np.asarray(truth.impacts.before)[:count, 1] > 0.15
+    starts = np.array([one.start.time for one in part.contacts])
+    seen = np.append(part.impacts.time, starts)
+    apart = np.min(np.abs(seen[None] - time[fast][:, None]), axis=1)
+    assert np.all(apart < 2 * run.interval)
+    for k in range(int(truth.contacts.count)):
+        start, stop = (float(x[k]) for x in (truth.contacts.start, truth.contacts.end))
+        assert stop < start + 0.01 or any(
+            one.first * run.interval < start < stop < one.last * run.interval + 1e-3
+            for one in part.contacts
+        )
