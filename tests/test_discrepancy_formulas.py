@@ -10,6 +10,7 @@ import pytest
 
 from jaxcam.discrepancy.report import formula_of
 from jaxcam.discrepancy.terms import Factor, Family, FREE, sum_of, Variable, Where
+from jaxcam.discrepancy.terms._primitives import OF_FACTORS
 
 
 LOW, HIGH, SLIP = -0.4, 1.1, 1e-3
@@ -22,6 +23,7 @@ NUMBERS = {
     "window": (1.5, 0.3, 0.7),
     "bump": (0.8, 0.5, 0.1),
     "square": (2.0,),
+    "parabola": (2.0, 0.3),
     "cube": (-2.0,),
     "exponential": (0.5, 3.0),
     "power": (0.6, 2.2),
@@ -74,6 +76,9 @@ def _forms():
         for names in SUMS.get(argument, ()):
             both = sum_of([forms[name] for name in names], [1.0] * len(names))
             yield pytest.param(family, both, id=f"{argument} {both.name}")
+    damping = _family(Variable.POSITION, Factor.VELOCITY)
+    for primitive in OF_FACTORS:
+        yield pytest.param(damping, primitive, id=f"damping {primitive.name}")
 
 
 def _wrapped(x):
@@ -95,7 +100,8 @@ def test_the_formula_is_the_function_that_was_fitted(family, primitive):
     text, _ = formula_of(family, primitive, numbers, "force")
     names = {"max": np.maximum, "sign": np.sign, "wrapped": _wrapped}
     names |= {name: getattr(np, name) for name in ("exp", "cos", "sin", "tanh")}
-    written = eval(text, names | {str(family.argument): at})
+    factors = {"velocity": 1.0}
+    written = eval(text, names | factors | {str(family.argument): at})
     size = np.max(np.abs(found))
     close = np.abs(found - written) < 2e-3 * size
     assert size > 0 and np.mean(close) > 0.85
@@ -230,12 +236,17 @@ def test_a_form_is_refused_where_its_place_is_outside_the_data():
         ("dead zone", (2.0, 0.9, 0.3)),
         ("dead zone", (2.0, 0.5, -0.2)),
         ("curved above", (2.0, 0.5, -0.5)),
+        # steps in disguise
+        ("curved above", (2.0, 0.5, 0.01)),
+        ("saturating", (1.5, 0.4, 1e-3)),
         ("fast", (1.0, 0.7)),
         ("power of speed", (1.0, -0.5)),
     ],
 )
 def test_a_form_with_parameters_that_make_no_sense_is_refused(name, numbers):
-    """Edges in the wrong order or outside, negative lengths and exponents."""
+    """Edges in the wrong order or outside; lengths and exponents that are negative, or
+    so small that the form is a step.
+    """
     family = _family(Variable.VELOCITY)
     form = next(one for one in family.primitives if one.name == name)
     assert form.within(NUMBERS[name]) and not form.within(numbers)

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ._parametric_form import Primitive
 from ._primitives import (
     FROM_ZERO,
+    OF_FACTORS,
     OF_PHASE,
     OF_SPEED,
     OF_TIME,
@@ -111,7 +112,12 @@ class Family:
             return (*ON_A_LINE, *FROM_ZERO, *OF_TIME)
         if self.argument is Variable.APPROACH:
             return (*ON_A_LINE, *FROM_ZERO)
-        return (*ON_A_LINE, *OF_SPEED) if self.jumps else ON_A_LINE
+        more = OF_SPEED if self.jumps else ()
+        return (
+            *ON_A_LINE,
+            *more,
+            *(OF_FACTORS if self.factor is not Factor.ONE else ()),
+        )
 
     @property
     def summands(self) -> tuple[Primitive, ...]:

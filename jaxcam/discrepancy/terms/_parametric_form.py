@@ -41,7 +41,8 @@ class Primitive(NamedTuple):
     - `odd`: whether the form is multiplied by the direction of motion.
     - `places`: the parameters that are positions, as fractions of the range; if there
       are two, the first is the lower one.
-    - `positive`: the parameters that are lengths or exponents.
+    - `limits`: for each parameter that is a length or an exponent, its index and the
+        value that it must exceed.
     - `ends`: further positions within the range, as a function of the parameters.
     - `apart`: for a form whose value or slope jumps at edges, the distance between them
         as a fraction of the range, as a function of the parameters.
@@ -57,7 +58,7 @@ class Primitive(NamedTuple):
     jump: float = 0.0
     odd: bool = False
     places: tuple[int, ...] = ()
-    positive: tuple[int, ...] = ()
+    limits: tuple[tuple[int, float], ...] = ()
     ends: Callable | None = None
     apart: Callable | None = None
     special: Any = None
@@ -76,7 +77,7 @@ class Primitive(NamedTuple):
 
     def within(self, numbers) -> bool:
         """Return whether the positions lie in the range of the argument, in ascending
-        order, and lengths and exponents are positive.
+        order, and lengths and exponents exceed their limits.
         """
         if self.parts:
             return all(part.within(own) for part, own in self.divided(numbers))
@@ -86,7 +87,7 @@ class Primitive(NamedTuple):
         return (
             all(0.0 <= place <= 1.0 for place in every)
             and places == sorted(places)
-            and all(numbers[k] > 0 for k in self.positive)
+            and all(numbers[k] > limit for k, limit in self.limits)
         )
 
     @property

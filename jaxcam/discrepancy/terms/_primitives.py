@@ -13,6 +13,8 @@ from ._parametric_form import Place, Primitive
 # Half-width over which edges are smoothed, as a fraction of the range: the distance
 # between two knots of the spline that represents a form
 _EDGE = 0.004
+# Smallest exponent of a distance: with a smaller one, the form is a step
+_FLATTEST = 0.2
 # Smallest argument of a power, as a fraction of the range, so that its derivatives
 # exist
 _LEAST = 1e-6
@@ -88,6 +90,13 @@ BUMP = Primitive(
     places=(1,),
 )
 SQUARE = Primitive("square", lambda at, p: p[0] * (at.u - 0.5) ** 2)
+PARABOLA = Primitive(
+    "parabola",
+    lambda at, p: p[0] * (at.u - p[1]) ** 2,
+    (_shares(0.0, 1.0, 21),),
+    (0.05,),
+    places=(1,),
+)
 CUBE = Primitive("cube", lambda at, p: p[0] * (at.u - 0.5) ** 3)
 EXPONENTIAL = Primitive(
     "exponential",
@@ -107,7 +116,7 @@ SETTLING = Primitive(
     lambda at, p: p[0] * (1 - at.xp.exp(-p[1] * at.u)),
     ((0.5, 1.0, 2.0, 4.0, 8.0, 16.0),),
     (1.0,),
-    positive=(1,),
+    limits=((1, 0.0),),
 )
 CURVED_ABOVE = Primitive(
     "curved above",
@@ -115,7 +124,7 @@ CURVED_ABOVE = Primitive(
     (_shares(0.05, 0.9, 35), (1.5, 2.0, 3.0)),
     (0.05, 0.2),
     places=(1,),
-    positive=(2,),
+    limits=((2, _FLATTEST),),
     special=ABOVE,
     apart=lambda p: 1.0 + 0.0 * p[1],
 )
@@ -125,7 +134,7 @@ CURVED_BELOW = Primitive(
     (_shares(0.1, 0.95, 35), (1.5, 2.0, 3.0)),
     (0.05, 0.2),
     places=(1,),
-    positive=(2,),
+    limits=((2, _FLATTEST),),
     special=BELOW,
     apart=lambda p: 1.0 + 0.0 * p[1],
 )
@@ -135,7 +144,7 @@ DEAD_ZONE = Primitive(
     (_shares(0.2, 0.8, 25), _shares(0.04, 0.4, 10)),
     (0.05, 0.05),
     places=(1,),
-    positive=(2,),
+    limits=((2, 0.0),),
     ends=lambda p: (p[1] - p[2], p[1] + p[2]),
     apart=lambda p: 2 * abs(p[2]),
 )
@@ -145,7 +154,7 @@ SATURATING = Primitive(
     (_INSIDE, (0.05, 0.1, 0.2, 0.4)),
     (0.05, 0.05),
     places=(1,),
-    positive=(2,),
+    limits=((2, _EDGE),),
 )
 WAVE = Primitive(
     "wave",
@@ -178,7 +187,7 @@ POWER_OF_SPEED = Primitive(
     ((0.5, 1.5, 2.0, 3.0, 4.0),),
     (0.2,),
     odd=True,
-    positive=(1,),
+    limits=((1, 0.0),),
 )
 HARMONICS = tuple(
     Primitive(
@@ -230,6 +239,9 @@ ON_A_LINE = (
 )
 FROM_ZERO = (POWER,)
 OF_TIME = (SETTLING,)
+# the rig parameters represent a force that is linear in the position, but not such a
+# force times a factor
+OF_FACTORS = (PARABOLA,)
 OF_SPEED = (FORWARD, BACKWARD, FALLING, FAST, POWER_OF_SPEED)
 # dry friction alone is a named term
 ONLY_IN_SUMS = (DRY,)
@@ -241,6 +253,7 @@ PRIMITIVES = (
     *OF_PHASE,
     *FROM_ZERO,
     *OF_TIME,
+    *OF_FACTORS,
     *ONLY_IN_SUMS,
 )
 """All forms, in the order of their indices in a compiled program."""
