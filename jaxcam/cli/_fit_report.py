@@ -9,6 +9,7 @@ from rich.table import Table
 matplotlib.use("Agg")
 
 from ..fitting import Bootstrap, Fit, Problem, residuals
+from ..fitting.engine import nominal_of
 from ..plotting.colours import CONTACT, FLIGHT
 from ._residual_axes import Along, residual_label, shown_in, sides, title_of
 
@@ -40,10 +41,7 @@ def parameter_table(problem: Problem, found: Fit, again: Bootstrap | None) -> Ta
 
 def nominal_value(problem: Problem, name: str) -> float:
     """Return the nominal value of a parameter."""
-    stated = problem.parameter(name).nominal
-    if stated is not None:
-        return stated
-    return float(problem.start.values[0, problem.names.index(name)])
+    return nominal_of(problem, problem.names.index(name))
 
 
 def correlation_table(found: Fit) -> Table:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._descend import Objective
-from .engine import cost_by_recording, own_states, Point, Weights
+from .engine import cost_by_recording, nominal_of, own_states, Point, Weights
 
 
 # Number of values, spread evenly over the tolerance, at which each recording is tried
@@ -37,7 +37,7 @@ def own_value_starts(objective: Objective, point: Point) -> Point | None:
     best = point
     for p in own:
         one = problem.parameters[p]
-        middle = problem.start.values[0, p] if one.nominal is None else one.nominal
+        middle = nominal_of(problem, p)
         shares = (2 * np.arange(_VALUES) + 1) / _VALUES - 1
         found, least = best, _record_costs(objective, best)
         for value in np.clip(middle + shares * one.tolerance, one.lower, one.upper):

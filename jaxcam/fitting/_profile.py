@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from ._fit import fit
 from ._fit_result import Fit
-from .engine import Weights
+from .engine import nominal_of, Weights
 
 
 @dataclasses.dataclass(frozen=True)
@@ -190,7 +190,5 @@ def _require_shared(found: Fit, name: str) -> None:
 def _known(problem, name: str, values):
     """Return the contribution of the prior to the cost, at given values."""
     parameter = problem.parameter(name)
-    nominal = parameter.nominal
-    if nominal is None:
-        nominal = float(problem.start.values[0, problem.names.index(name)])
+    nominal = nominal_of(problem, problem.names.index(name))
     return ((values - nominal) / parameter.prior_stderr) ** 2

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from ...fitting.engine import invert_information
+from ...fitting.engine import invert_information, nominal_of
 from ..search import Trial, Trials
 
 
@@ -46,10 +46,7 @@ def beyond_tolerance(trials: Trials, best: Trial, deviation) -> list[Beyond]:
         parameter = trials.problem.parameter(name)
         if not math.isfinite(parameter.tolerance) or parameter.per_record:
             continue
-        nominal = parameter.nominal
-        if nominal is None:
-            place = trials.problem.names.index(name)
-            nominal = float(np.asarray(trials.problem.start.values)[0, place])
+        nominal = nominal_of(trials.problem, trials.problem.names.index(name))
         one = best.fit[name]
         stderr = max(one.stderr, deviation.get(name, 0.0))
         low, high = nominal - parameter.tolerance, nominal + parameter.tolerance

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...fitting import Fit
+from ...fitting.engine import nominal_of
 from ...tables import scaled
 from ..evidence import Choice, HeldOut, Limit, rms_of
 from ..policy import Policy
@@ -172,9 +173,7 @@ def _limit(within: Fit, label: str) -> str:
     """Return words that say that a value is at the limit of its tolerance."""
     one, problem = within[label], within.problem
     parameter = problem.parameter(one.name)
-    nominal = parameter.nominal
-    if nominal is None:
-        nominal = float(problem.start.values[0, problem.names.index(one.name)])
+    nominal = nominal_of(problem, problem.names.index(one.name))
     ends = (nominal - parameter.tolerance, nominal + parameter.tolerance)
     at_limit = any(math.isclose(one.value, end) for end in ends)
     return ", the limit of its tolerance" if at_limit else ""

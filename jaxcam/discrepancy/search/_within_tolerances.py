@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...fitting import Fit, fit, Parameter
+from ...fitting.engine import nominal_of
 from ..policy import Policy
 from ._given_up import given_up
 
@@ -49,9 +50,7 @@ def _bounded(problem, best: Fit, name: str) -> Parameter:
     """Return the parameter with its tolerance as bounds."""
     parameter = problem.parameter(name)
     place = problem.names.index(name)
-    nominal = parameter.nominal
-    if nominal is None:
-        nominal = float(problem.start.values[0, place])
+    nominal = nominal_of(problem, place)
     known = np.asarray(best.point.values)[:, place]
     low = min(nominal - parameter.tolerance, float(np.min(known)))
     high = max(nominal + parameter.tolerance, float(np.max(known)))
