@@ -45,7 +45,7 @@ def chosen(monkeypatch, unchecked_types):
         def fitted(self, start):
             _, primitive, numbers = start
             tried.append(primitive.name)
-            if primitive.special is None and numbers is not None:
+            if not primitive.special and numbers is not None:
                 # the special case starts from the fitted numbers but the last
                 assert numbers.tolist() == [0.0, 1.0]
             score = scores[primitive]
@@ -75,12 +75,18 @@ def chosen(monkeypatch, unchecked_types):
 class Form(str):
     """A form that is only a name."""
 
-    special: Any = None
+    special: tuple = ()
     count: int = 5
 
     @property
     def name(self):
         return str(self)
+
+
+def special_case(form, applies=True):
+    return types.SimpleNamespace(
+        form=form, numbers=lambda p: p[:-1], applies=lambda _: applies
+    )
 
 
 def test_a_form_that_promises_less_is_not_fitted(chosen):
@@ -106,16 +112,24 @@ def test_a_form_with_less_evidence_than_the_curve_is_not_kept(chosen):
 def test_a_form_with_an_exponent_is_followed_by_that_of_one(chosen):
     """It starts from the fitted edge and may win although it promised too little."""
     power, line, bump = Form("power"), Form("line"), Form("bump")
-    power.special = line
+    power.special = (special_case(line),)
     forms = {bump: (90.0, 950.0), power: (80.0, 970.0), line: (None, 930.0)}
     score, tried = chosen(forms)
     assert tried == ["bump", "power", "line"] and score == 930.0
 
 
+def test_a_special_case_is_fitted_where_it_applies(chosen):
+    zone, ramp, line = Form("dead zone"), Form("ramp"), Form("line")
+    zone.special = special_case(ramp), special_case(line, applies=False)
+    forms = {zone: (80.0, 970.0), ramp: (None, 960.0), line: (None, 900.0)}
+    score, tried = chosen(forms)
+    assert tried == ["dead zone", "ramp"] and score == 960.0
+
+
 def test_a_form_is_fitted_once(chosen):
     """Its special case is among the promising forms as well."""
     power, line = Form("power"), Form("line")
-    power.special = line
+    power.special = (special_case(line),)
     forms = {power: (80.0, 970.0), line: (79.0, 930.0)}
     assert chosen(forms)[1] == ["power", "line"]
 

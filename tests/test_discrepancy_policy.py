@@ -96,6 +96,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         # the forms of free functions, and where a fit of them may start
         "_EDGE",
         "_FLATTEST",
+        "_AT_END",
         "_LEAST",
         "BEYOND",
         "_GRID",

@@ -136,8 +136,7 @@ class _Trials:
     def run(self, waiting: list[Start]) -> None:
         """Fit forms in turn, until the next one is unlikely to have more evidence.
 
-        A form with an exponent is followed by its special case for an exponent of one,
-        which has one parameter fewer.
+        A form is followed by its special cases, such as that for an exponent of one.
         """
         waiting, done, least = list(waiting), set(), -math.inf
         while waiting and not self.clock.over:
@@ -156,10 +155,12 @@ class _Trials:
             if trial.score < self.found.score:
                 # only a form with a similar predicted gain may have more evidence
                 least = max(least, gain - self.fits.policy.lead_bic)
-            if form.special is not None:
-                names = _in_slot(trial, self.one.slot).coefficients[:-1]
-                numbers = np.array([trial.fit[name].value for name in names])
-                waiting.insert(0, Start(gain, form.special, numbers))
+            fitted: Free = _in_slot(trial, self.one.slot)  # pyright: ignore
+            numbers = _numbers_of(trial, fitted).tolist()
+            for special in form.special:
+                if special.applies(numbers):
+                    own = np.array(special.numbers(numbers))
+                    waiting.insert(0, Start(gain, special.form, own))
 
     def may_do(self, start: Start, likelihood: CurveLikelihood) -> bool:
         """Return whether a form is expected to have about as much evidence as the

@@ -47,7 +47,7 @@ class Primitive(NamedTuple):
     - `apart`: for a form whose value or slope jumps at edges, the distance between them
         as a fraction of the range, as a function of the parameters.
     - `sharp`: whether its value jumps there.
-    - `special`: the same form for an exponent (its last parameter) of one.
+    - `special`: simpler forms that may replace this one after its fit.
     - `parts`: the forms that are added; empty unless the form is a sum.
     """
 
@@ -61,7 +61,7 @@ class Primitive(NamedTuple):
     limits: tuple[tuple[int, float], ...] = ()
     ends: Callable | None = None
     apart: Callable | None = None
-    special: Any = None
+    special: "tuple[Special, ...]" = ()
     sharp: bool = False
     parts: tuple[Any, ...] = ()
 
@@ -106,6 +106,19 @@ class Primitive(NamedTuple):
         smooth = self.function(place, numbers)
         turned = smooth * direction if self.odd else smooth
         return turned + self.jump * numbers[0] * direction
+
+
+class Special(NamedTuple):
+    """A simpler `form`, with fewer parameters, that a form may be close to.
+
+    - `numbers(numbers)`: parameters from which its fit may start, given those of the
+      other form.
+    - `applies(numbers)`: whether that form, with these parameters, may be close to it.
+    """
+
+    form: Primitive
+    numbers: Callable[[Sequence[float]], Sequence[float]]
+    applies: Callable[[Sequence[float]], bool] = lambda numbers: True
 
 
 def sum_of(parts: Sequence[Primitive], sizes: Sequence[float]) -> Primitive:

@@ -7,12 +7,14 @@ them.
 
 import numpy as np
 
-from ._parametric_form import Place, Primitive
+from ._parametric_form import Place, Primitive, Special
 
 
 # Half-width over which edges are smoothed, as a fraction of the range: the distance
 # between two knots of the spline that represents a form
 _EDGE = 0.004
+# An edge within this fraction of the range from its end may not be needed
+_AT_END = 0.1
 # Smallest exponent of a distance: with a smaller one, the form is a step
 _FLATTEST = 0.2
 # Smallest argument of a power, as a fraction of the range, so that its derivatives
@@ -42,6 +44,11 @@ def _wrapped(x):
 
 def _shares(low: float, high: float, count: int) -> tuple[float, ...]:
     return tuple(np.linspace(low, high, count).tolist())
+
+
+def _without_exponent(form: Primitive) -> Special:
+    """Return the special case for an exponent, the last parameter, of one."""
+    return Special(form, lambda p: p[:-1])
 
 
 _INSIDE = _shares(0.02, 0.98, 49)
@@ -81,6 +88,11 @@ WINDOW = Primitive(
     places=(1, 2),
     apart=lambda p: abs(p[2] - p[1]),
     sharp=True,
+    # up to a constant, one edge outside the range leaves a step at the other one
+    special=(
+        Special(STEP, lambda p: (p[0], p[1]), lambda p: p[2] > 1 - _AT_END),
+        Special(STEP, lambda p: (-p[0], p[2]), lambda p: p[1] < _AT_END),
+    ),
 )
 BUMP = Primitive(
     "bump",
@@ -109,7 +121,7 @@ POWER = Primitive(
     lambda at, p: p[0] * at.xp.maximum(at.u, _LEAST) ** p[1],
     ((0.5, 1.5, 2.0, 3.0),),
     (0.2,),
-    special=STRAIGHT,
+    special=(_without_exponent(STRAIGHT),),
 )
 SETTLING = Primitive(
     "settling",
@@ -125,7 +137,7 @@ CURVED_ABOVE = Primitive(
     (0.05, 0.2),
     places=(1,),
     limits=((2, _FLATTEST),),
-    special=ABOVE,
+    special=(_without_exponent(ABOVE),),
     apart=lambda p: 1.0 + 0.0 * p[1],
 )
 CURVED_BELOW = Primitive(
@@ -135,7 +147,7 @@ CURVED_BELOW = Primitive(
     (0.05, 0.2),
     places=(1,),
     limits=((2, _FLATTEST),),
-    special=BELOW,
+    special=(_without_exponent(BELOW),),
     apart=lambda p: 1.0 + 0.0 * p[1],
 )
 DEAD_ZONE = Primitive(
@@ -147,6 +159,12 @@ DEAD_ZONE = Primitive(
     limits=((2, 0.0),),
     ends=lambda p: (p[1] - p[2], p[1] + p[2]),
     apart=lambda p: 2 * abs(p[2]),
+    special=(
+        Special(ABOVE, lambda p: (p[0], p[1] + p[2]), lambda p: p[1] - p[2] < _AT_END),
+        Special(
+            BELOW, lambda p: (-p[0], p[1] - p[2]), lambda p: p[1] + p[2] > 1 - _AT_END
+        ),
+    ),
 )
 SATURATING = Primitive(
     "saturating",
