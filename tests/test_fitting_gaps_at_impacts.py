@@ -11,6 +11,7 @@ import pytest
 import jaxcam
 from jaxcam.fitting import Model, Parameter, segment_by_model, Sensor
 from jaxcam.fitting._gaps_at_impacts import fitted_to_impacts, gap_points, GapPoints
+from jaxcam.fitting._measured_gaps import measured_gaps
 from jaxcam.hybrid import HybridSystem
 from jaxcam.recordings import Recording
 
@@ -121,3 +122,30 @@ def test_impacts_and_rests_are_found(omega, phase):
             one.first * run.interval < start < stop < one.last * run.interval + 1e-3
             for one in part.contacts
         )
+
+
+class Box(Shaken):
+    """A ball between the table and a lid at rest, which it does not reach."""
+
+    lid: jax.Array = _number(0.2)
+
+    def gap(self, t, state):
+        return jnp.stack([super().gap(t, state), self.lid - state[0]])
+
+    def impact(self, t, state):
+        down = jnp.stack([state[0], -self.restitution * state[1]])
+        return jnp.stack([super().impact(t, state), down])
+
+
+def test_a_gap_that_no_impact_shows_keeps_its_error():
+    """The lid is known to 2 mm; the table, after the fit, to 0.1 mm."""
+    _, run = measured(*RUNS[1])
+    model = Model(Box(omega=RUNS[1][0]), {"height_m": Sensor(0, noise=NOISE)})
+    lid = Parameter("lid", lambda m: m.system.lid, tolerance=2e-3)
+    states = np.stack([run["height_m"], np.zeros(len(run))], axis=1)
+    picks = {0: "height_m"}
+    gaps, _, errors, _ = measured_gaps(
+        model, (*PARAMETERS, lid), run, states, None, picks
+    )
+    assert gaps.shape == (2, len(run))
+    assert errors[0] < 1e-4 and errors[1] == pytest.approx(2e-3)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.optimize import least_squares
 
 from ..recordings.cut import gap_jumps
@@ -42,10 +42,15 @@ class GapPoints(NamedTuple):
 
 
 class FittedValues(NamedTuple):
-    """Values of the parameters `(p,)`, and their covariance `(p, p)`."""
+    """Values of the parameters `(p,)`, which of them affect the gaps at the impacts,
+    `(p,)`, their covariance `(p, p)`, zero for the others, and the gap that remains at
+    each impact, `(i,)`, zero if the impact was left out.
+    """
 
     values: Float[np.ndarray, " p"]
+    fitted: Bool[np.ndarray, " p"]
     covariance: Float[np.ndarray, "p p"]
+    left: Float[np.ndarray, " i"]
 
 
 def gap_points(
@@ -93,7 +98,8 @@ def fitted_to_impacts(
     """
     start, slopes = gaps_of(nominal)
     reach = np.max(np.abs(slopes), axis=0, initial=0.0)
-    moving = np.flatnonzero((reach > 0) & (tolerances > 0))
+    fitted = (reach > 0) & (tolerances > 0)
+    moving = np.flatnonzero(fitted)
     if not len(moving) or len(points.time) < len(moving) + _MORE:
         return None
     scale = np.where(np.isfinite(tolerances), tolerances, 1.0)[moving]
@@ -131,13 +137,13 @@ def fitted_to_impacts(
         key=lambda one: one.cost,
     )
     count = len(points.time)
-    off = np.abs(misfits(best.x)[:count])
-    usual = float(np.median(off))
-    if usual > _USUAL or np.mean(off < _ON) < _MOST:
+    off = misfits(best.x)[:count]
+    on = np.abs(off) < _ON
+    if np.median(np.abs(off)) > _USUAL or np.mean(on) < _MOST:
         return None
-    kept = np.append(off < _ON, np.ones(len(moving), dtype=bool))
-    rows = rates(best.x)[kept]
+    rows = rates(best.x)[np.append(on, np.ones(len(moving), dtype=bool))]
     inverse = np.linalg.pinv(rows.T @ rows)
     covariance = np.zeros((len(nominal), len(nominal)))
     covariance[np.ix_(moving, moving)] = inverse * np.outer(scale, scale)
-    return FittedValues(values_of(best.x), covariance)
+    left = np.where(on, off * points.error, 0.0)
+    return FittedValues(values_of(best.x), fitted, covariance, left)

@@ -77,7 +77,13 @@ def measured_gaps(
             values = found.values
             gaps, by_state, by_value = gaps_and_slopes(values)
             spread = np.einsum("kgp,pq,kgq->kg", by_value, found.covariance, by_value)
-            errors = np.minimum(_SURE * np.sqrt(np.max(spread, axis=0)), errors)
+            counts = np.bincount(points.gap, minlength=len(gaps))
+            left = np.bincount(points.gap, found.left**2, minlength=len(gaps))
+            fitted = np.max(spread, axis=0) + left / np.maximum(counts, 1)
+            # an error that other parameters cause remains as it was
+            known = np.all((parts == 0) | found.fitted, axis=-1)
+            least = np.minimum(_SURE * np.sqrt(fitted), errors)
+            errors = np.where(known, least, errors)
     slopes = np.max(np.abs(by_state), axis=0)
     rates: list = [None] * len(gaps)
     clear = [k for k, name in picks.items() if not np.any(saturated(recording[name]))]
