@@ -128,7 +128,9 @@ def fitted_to_impacts(
         np.zeros(len(moving)),
         *(share * np.eye(len(moving))[first] for share in shares),
     ]
-    trials.sort(key=robust)
+    trials = sorted(filter(lambda one: np.isfinite(robust(one)), trials), key=robust)
+    if not trials:
+        return None
     best = min(
         (
             least_squares(misfits, trial, jac=rates, loss="soft_l1")  # pyright: ignore
