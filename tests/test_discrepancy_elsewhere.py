@@ -11,12 +11,17 @@ from test_discrepancy_coordinates import Pair, PAIRS, Push, Softer
 
 from jaxcam import HybridSystem
 from jaxcam.discrepancy import diagnose, library, Policy, Verdict
-from jaxcam.discrepancy._elsewhere import falls_short, sought_elsewhere
+from jaxcam.discrepancy._elsewhere import (
+    falls_short,
+    law_elsewhere,
+    sought_elsewhere,
+)
 from jaxcam.discrepancy.report import Diagnosis
 from jaxcam.discrepancy.search import _slots
 from jaxcam.discrepancy.search._roughness import Roughness
 from jaxcam.discrepancy.search._slots import filled, roomy, slots_of
 from jaxcam.discrepancy.terms import (
+    EVERY,
     Family,
     gaps_of,
     Location,
@@ -69,10 +74,10 @@ class Free(Warm):
 def test_the_other_locations_are_measured_coordinates_and_gaps(unchecked_types):
     """Two masses, a wall and their contact; a velocity is no position."""
     both = other_locations(_problem(Pair(), SENSORS, 4))  # pyright: ignore
-    assert both == [Location(1, 0), Location(0, 1)]
+    assert both == [Location(1, 0), Location(0, 1), Location(0, EVERY)]
     one = {"one_m": SENSORS["one_m"], "rate_m_s": Sensor(3, noise=1e-3)}
     only = other_locations(_problem(Pair(), one, 4))  # pyright: ignore
-    assert only == [Location(0, 1)]
+    assert only == [Location(0, 1), Location(0, EVERY)]
 
 
 def test_a_gap_is_evaluated_at_the_whole_state(unchecked_types):
@@ -115,6 +120,20 @@ def test_library_terms_act_at_the_gap_of_a_location():
     wall, joint = system.impact(0.3, state)
     np.testing.assert_array_equal(wall, Pair().impact(0.3, state)[0])
     assert float(joint[3] - joint[1]) == pytest.approx(0.6 * 0.5 * 2.0, rel=1e-12)
+
+
+def test_a_law_at_every_gap_acts_at_all_of_them():
+    """Both impacts are softer; errors of surfaces remain at the first gap."""
+    every = Location(constraint=EVERY)
+    places = {term.constraint for term in map(every.of_library, library())}
+    assert places == {0, EVERY}
+    softer, state = every.of_library(Softer(0.5)), jnp.array([0.2, 1.5, 0.2, -0.5])
+    found = WithTerms(Pair(), (softer,), PAIRS).impact(0.3, state)
+    for gap in (0, 1):
+        alone = Location(constraint=gap).of_library(Softer(0.5))
+        one = WithTerms(Pair(), (alone,), PAIRS).impact(0.3, state)
+        np.testing.assert_array_equal(found[gap], one[gap])
+        assert not np.allclose(found[gap], Pair().impact(0.3, state)[gap])
 
 
 def test_each_gap_has_a_slot_of_its_own():
@@ -174,15 +193,18 @@ class _Found:
     [
         # the second coordinate explains everything: the gap is not tried
         ((1000.0, 1000.0), ("x2", "constraint 0"), 1),
-        ((4000.0, 1500.0), ("x1", "constraint 1"), 2),
+        ((4000.0, 1500.0), ("x1", "constraint 1"), 3),
+        # the same law at both gaps
+        ((4000.0, 1500.0, 1000.0), ("x1", "every gap"), 3),
         # a little less than the first: not worth another place
-        ((4000.0, 4500.0), None, 2),
+        ((4000.0, 4500.0), None, 3),
     ],
 )
 def test_the_location_that_explains_clearly_more_is_chosen(
     costs, chosen, asked, unchecked_types
 ):
-    given = dict(zip((Location(1, 0), Location(0, 1)), costs))
+    given = {Location(0, EVERY): 5000.0}
+    given |= zip((Location(1, 0), Location(0, 1), Location(0, EVERY)), costs)
     tried = []
 
     def ask(location):
@@ -207,7 +229,7 @@ def test_a_named_effect_that_explains_nearly_everything_does_not_fall_short(
 
 def test_a_function_at_the_first_gap_is_not_said_to_act_at_another(unchecked_types):
     """It was found by the search at the second gap, which offers functions at both."""
-    law = (SimpleNamespace(gap="constraint 0"),)
+    law = (SimpleNamespace(gap="constraint 0", kind="surface", arguments=("time",)),)
 
     def ask(location):
         cost = 1000.0 if location == Location(0, 1) else 5000.0
@@ -216,6 +238,26 @@ def test_a_function_at_the_first_gap_is_not_said_to_act_at_another(unchecked_typ
     found = sought_elsewhere(_Found(5000.0), ask)  # pyright: ignore
     assert (found.cost, found.location) == (1000.0, None)
     assert "acts at" not in found.summary
+
+
+def test_a_law_at_another_gap_is_named_there(unchecked_types):
+    """The unnamed law leaves as little as the named one; its gap is tried first."""
+    law = SimpleNamespace(gap="constraint 1", kind="restitution", arguments=("speed",))
+    unnamed = _Found(1010.0, missing=(law,))
+    assert law_elsewhere(unnamed)  # pyright: ignore
+    law_at_first = SimpleNamespace(**vars(law) | {"gap": "constraint 0"})
+    assert not law_elsewhere(_Found(1010.0, missing=(law_at_first,)))  # pyright: ignore
+    tried = []
+
+    def ask(location):
+        tried.append(location)
+        effects = (SimpleNamespace(term=True),)
+        return _Found(1005.0, Verdict.EFFECT, effects=effects)
+
+    found = sought_elsewhere(unnamed, ask)  # pyright: ignore
+    assert tried == [Location(0, 1)]
+    assert found.verdict is Verdict.EFFECT
+    assert found.location == ("x1", "constraint 1")
 
 
 def test_terms_of_ones_own_are_not_moved_to_other_gaps(unchecked_types):

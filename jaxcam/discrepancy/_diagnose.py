@@ -10,7 +10,7 @@ from ..fitting import Input, Parameter, Sensor, Setup, Turning
 from ..hybrid import HybridSystem
 from ..recordings import Recording, Rig, Segments
 from ._answer import Answer, answered, Conditions
-from ._elsewhere import falls_short, sought_elsewhere
+from ._elsewhere import falls_short, law_elsewhere, sought_elsewhere
 from ._lagging import long_lag, more_accurate
 from ._mappings import make_room
 from ._set_aside import not_set_aside, odd_record, set_aside, visits_own_states
@@ -102,8 +102,7 @@ def diagnose(
         return answered(question, folder, conditions, before)
 
     def asked_at(location: Location) -> Diagnosis:
-        kind, k = ("coordinate", 0) if location.coordinate else ("gap", 1)
-        conditions.report(f"searching at {kind} {location[k] + 1}", None)
+        conditions.report(f"searching at {location.numbered}", None)
         folder = keep and keep / "at_{}_{}".format(*location)
         return asked(recordings, folder, location, lags).diagnosis
 
@@ -123,7 +122,7 @@ def diagnose(
         folder = None if keep is None else keep / "without_one"
         again = asked(others, folder, lags=lags, before=first)
         found = _without_or_with(odd, first, again.diagnosis)
-    elif falls_short(found):
+    elif falls_short(found) or law_elsewhere(found):
         found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
     if keep is not None and not conditions.clock.stopped:
         # with more time, an interrupted search may continue from its fits

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from .evidence import above_noise
 from .report import Diagnosis, Verdict
-from .terms import Location, other_locations, WithTerms
+from .terms import EVERY, Location, other_locations, WithTerms
 
 
 def falls_short(found: Diagnosis) -> bool:
@@ -24,12 +24,41 @@ def falls_short(found: Diagnosis) -> bool:
     return above_noise(left, samples, found.policy)
 
 
+def law_elsewhere(found: Diagnosis) -> bool:
+    """Return whether an unnamed law of restitution was found at a gap other than the
+    first. The library has such laws, but they were sought at the first gap alone.
+    """
+    return bool(_gaps_with_law(found))
+
+
+def _gaps_with_law(found: Diagnosis) -> set[str]:
+    """Return the names of the gaps other than the first with an unnamed law."""
+    system = found.after.problem.model.system
+    laws = {
+        one.gap
+        for one in found.missing
+        if one.kind == "restitution" and one.arguments == ("speed",)
+    }
+    return laws - {system.constraint_name(0), None}
+
+
 def _left(found: Diagnosis) -> float:
     """Return the part of the cost that exceeds the cost of noise alone, multiplied by
     the variance of the noise, which may be larger if model errors are allowed for.
     """
     excess = max(found.after.cost - found.after.problem.samples, 0.0)
     return excess * found.noise_floor**2
+
+
+def _explains(other: Diagnosis, best: Diagnosis) -> bool:
+    """Return whether a diagnosis at another location is preferred to the best so far:
+    it leaves much less, or it names what the other one does not.
+    """
+    allowed = best.policy.elsewhere * _left(best)
+    if other.verdict is Verdict.EFFECT and best.verdict is Verdict.UNKNOWN:
+        explained = (best.before.cost - best.after.cost) * best.noise_floor**2
+        allowed = max(allowed, best.policy.small * explained)
+    return _left(other) < allowed
 
 
 def sought_elsewhere(
@@ -45,10 +74,14 @@ def sought_elsewhere(
     system = problem.model.system
     assert isinstance(system, WithTerms)
     locations = [one for one in other_locations(problem) if one.coordinate or library]
+    laws = _gaps_with_law(found)
+    pairs = system.coordinates
+    # first, the gap at which an unnamed law was found
+    locations.sort(key=lambda one: one.said(system, pairs)[1] not in laws)
     best, where = found, Location()
     for location in locations[: found.policy.followed]:
         other = asked(location)
-        if _left(other) < found.policy.elsewhere * _left(best):
+        if _explains(other, best):
             best, where = other, location
         if not falls_short(best):
             break
@@ -60,10 +93,11 @@ def sought_elsewhere(
     if not named and not where.coordinate and gaps == {first[1]}:
         # functions at impacts are sought at several gaps, whatever the location
         return best
-    kind, k = ("coordinate", 0) if where.coordinate else ("gap", 1)
+    kind, k = ("the coordinate", 0) if where.coordinate else ("the gap", 1)
+    at = then[k] if where.constraint == EVERY else f"{kind} {then[k]}"
     sentence = (
-        f"This effect acts at the {kind} {then[k]}: no effect at {first[k]} explains "
-        "the recordings as well."
+        f"This effect acts at {at}: no effect at {first[k]} alone explains the "
+        "recordings as well."
     )
     return dataclasses.replace(
         best, summary=f"{best.summary} {sentence}", location=then

@@ -55,7 +55,8 @@ class Needs(NamedTuple):
     data.
 
     - `inclusion`: fraction of the bootstrap samples that would retain a part.
-    - `deviation`: standard deviation of each free parameter over the bootstrap samples.
+    - `deviation`: standard deviation of each free parameter over the bootstrap samples,
+      zero for one that has a value for each recording.
     - `lost`: predicted increase in the cost of all data if a part is removed, minus the
       penalty for its parameters. `worse`: the same, without the penalty.
     """
@@ -128,7 +129,11 @@ def needs(
             kept[name] += bool(left[name] > 0)
     spread = np.std(np.array(estimates), axis=0)
     deviation = dict.fromkeys(found.free, 0.0)
-    deviation |= {blocks.names[k]: float(s) for k, s in zip(free, spread)}
+    # a value of one recording does not vary over samples of recordings
+    shared = {name for name in blocks.names if blocks.names.count(name) == 1}
+    for k, s in zip(free, spread):
+        if blocks.names[k] in shared:
+            deviation[blocks.names[k]] = float(s)
     shares = {name: k / policy.bootstrap for name, k in kept.items()}
     net = lost(None)[1]
     worse = {name: net[name] + prices[name] for name in net}

@@ -18,7 +18,7 @@ from ..search import (
     Trial,
     Trials,
 )
-from ..terms import families, gaps_of
+from ..terms import EVERY, families, gaps_of
 from ._held_out import held_out, HeldOut
 from ._redrawn import Needs, needs
 from ._rivals import Rival, rivals
@@ -161,7 +161,7 @@ def _gaps_with_impacts(question: Question, policy: Policy) -> tuple[int, ...]:
     if not any(len(part.impacts.approach) for part in problem.segments):
         return ()
     first = range(min(gaps_of(problem), policy.functions))
-    return tuple(sorted({*first, question.location.constraint}))
+    return tuple(sorted({*first, question.location.constraint} - {EVERY}))
 
 
 def _needed(

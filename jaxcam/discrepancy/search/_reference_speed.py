@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ...fitting import Fit, fit
+from ...recordings.cut import Impacts
 from ..terms import Term, Value
 from ._question import FittedSpeed, Question
 from ._trials import Trial, Trials
@@ -15,6 +16,12 @@ from ._trials import Trial, Trials
 
 # relative change of the speed for second differences of the cost
 _CHANGE = 0.1
+
+
+def _approach(impacts: Impacts, term: Term) -> np.ndarray:
+    """Return the approach speeds at the gaps at which a term acts."""
+    here = [term.acts_at(int(side)) for side in impacts.side]
+    return impacts.approach[np.array(here, dtype=bool)]
 
 
 def with_fitted_speed(
@@ -30,7 +37,7 @@ def with_fitted_speed(
     if term is None or question.relisted is None or trials.clock.over:
         return None
     every = [p.impacts for p in question.problem.segments]
-    speeds = np.concatenate([i.approach[i.side == term.constraint] for i in every])
+    speeds = np.concatenate([_approach(i, term) for i in every])
     speeds = speeds[np.isfinite(speeds) & (speeds > 0)]
     if not len(speeds):
         return None

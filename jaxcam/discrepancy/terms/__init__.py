@@ -78,6 +78,7 @@ from ._switched_base import (
     system_with_terms as system_with_terms,
 )
 from ._term import (
+    EVERY as EVERY,
     Motion as Motion,
     SensorTerm as SensorTerm,
     Strength as Strength,

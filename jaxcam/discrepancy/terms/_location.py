@@ -9,14 +9,24 @@ import jax.numpy as jnp
 from ...fitting import Problem
 from ...fitting.engine import filtered_channels
 from ...hybrid import HybridSystem
-from ._term import Term
+from ._term import EVERY, Term
+from ._where import Where
 
 
 class Location(NamedTuple):
-    """Indices of the coordinate and of the gap on which missing physics acts."""
+    """Indices of the coordinate and of the gap on which missing physics acts; `EVERY`
+    for all gaps.
+    """
 
     coordinate: int = 0
     constraint: int = 0
+
+    @property
+    def numbered(self) -> str:
+        """Return the location in words, with numbers counted from one."""
+        if self.coordinate:
+            return f"coordinate {self.coordinate + 1}"
+        return "all gaps" if self.constraint == EVERY else f"gap {self.constraint + 1}"
 
     def first(self, pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
         """Return the coordinates of a system, beginning with that of the location."""
@@ -28,7 +38,11 @@ class Location(NamedTuple):
         Only its gap is set: forces and sensor errors act on the first coordinate, which
         `first` makes that of the location.
         """
-        return dataclasses.replace(term, constraint=self.constraint)
+        constraint = self.constraint
+        if constraint == EVERY and Where.CONTACT in term.acts:
+            # each surface has errors of its own
+            constraint = 0
+        return dataclasses.replace(term, constraint=constraint)
 
     def reordered(self, term: Term, coordinates: int) -> Term:
         """Return a user's term with the index that its coordinate has in the order of
@@ -58,12 +72,14 @@ class Location(NamedTuple):
         coordinate = (
             states[place] if place < len(states) else f"state component {place}"
         )
+        if self.constraint == EVERY:
+            return coordinate, "every gap"
         return coordinate, system.constraint_name(self.constraint)
 
 
 def other_locations(problem: Problem) -> list[Location]:
-    """Return the locations other than the first: the other measured coordinates, and
-    the other gaps.
+    """Return the locations other than the first: the other measured coordinates, the
+    other gaps, and all gaps.
     """
     system, sensors = problem.model.system, problem.model.sensors
     pairs = system.coordinates  # pyright: ignore
@@ -73,7 +89,8 @@ def other_locations(problem: Problem) -> list[Location]:
         for k, (place, _) in enumerate(pairs)
         if k and place in measured
     ]
-    return found + [Location(constraint=c) for c in range(1, gaps_of(problem))]
+    gaps = list(range(1, gaps_of(problem)))
+    return found + [Location(constraint=c) for c in (*gaps, *([EVERY] if gaps else []))]
 
 
 def gaps_of(problem: Problem) -> int:

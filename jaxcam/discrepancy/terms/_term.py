@@ -23,6 +23,10 @@ _METHODS = {
 }
 
 
+EVERY = -1
+"""The `constraint` of a term that acts at all gaps."""
+
+
 class Motion(NamedTuple):
     """The motion at which a term is evaluated.
 
@@ -180,7 +184,9 @@ class Term(eqx.Module):
     the term uses.
     """
     constraint: int = eqx.field(default=0, static=True, kw_only=True, metadata=_SPARE)
-    """Index of the gap whose surface or restitution is changed."""
+    """Index of the gap whose surface or restitution is changed; `EVERY` for the
+    restitution at all gaps.
+    """
     motion_unit: str = eqx.field(
         default="rad", static=True, kw_only=True, metadata=_SPARE
     )
@@ -222,6 +228,10 @@ class Term(eqx.Module):
         """Return the error of the sensor of the first coordinate, in its unit."""
         del motion
         return 0.0
+
+    def acts_at(self, number: int) -> bool:
+        """Return whether the gap with this index is one at which the term acts."""
+        return self.constraint in (number, EVERY)
 
     def scaled(self, scales: MotionScales) -> "Term":
         """Return the term with constants taken from the recordings."""

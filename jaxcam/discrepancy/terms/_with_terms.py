@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from ...fitting import Turning
 from ...hybrid import HybridSystem, Wrapping
 from ._free_function import prepared_terms
-from ._term import Motion, Term
+from ._term import EVERY, Motion, Term
 from ._where import Where
 
 
@@ -100,7 +100,7 @@ class WithTerms(Wrapping):
             return self._landed(t, state, 0)
         return jnp.stack(
             [
-                self._landed(t, state, k) if k in changed else after[k]
+                self._landed(t, state, k) if {k, EVERY} & changed else after[k]
                 for k in range(after.shape[0])
             ]
         )
@@ -189,14 +189,14 @@ class WithTerms(Wrapping):
         return total
 
     def _numbers(self, where: Where) -> list[int]:
-        """Return the constraints on which terms act."""
+        """Return the constraints on which terms act, `EVERY` among them."""
         return sorted({term.constraint for term in self._acting(where)})
 
     def _acting(self, where: Where, number: int | None = None) -> list[Term]:
         return [
             term
             for term in self.terms
-            if where in term.acts and number in (None, term.constraint)
+            if where in term.acts and (number is None or term.acts_at(number))
         ]
 
 
