@@ -23,7 +23,7 @@ _VALUES, _REFINED = 24, 3
 _ON, _USUAL = 5.0, 2.0
 # Minimum fraction of the impacts that must lie on the surfaces, and minimum number of
 # them in addition to that of the parameters
-_MOST, _MORE = 0.7, 3
+_MOST, _MORE = 0.7, 2
 # Jumps of several gaps within this number of sampling intervals are the same jump
 _SAME = 3
 # A tolerance is half the width of a uniform distribution with this standard deviation
