@@ -1,5 +1,6 @@
 """Write the diagnosis of a choice: verdict, effects, alternatives, caveats, numbers."""
 
+import math
 from collections.abc import Iterator, Mapping
 
 from ...fitting import Fit
@@ -268,6 +269,9 @@ def _rig_values(
         if one.name not in question.rig:
             continue
         stderr = max(one.stderr, deviation.get(one.name, 0.0))
+        if question.fitted_speed is not None:
+            more = question.fitted_speed.errors.get(one.label, 0.0)
+            stderr = math.hypot(stderr, more)
         value, unit = one.value, one.unit
         if one.name in question.shown:
             shown = question.shown[one.name]

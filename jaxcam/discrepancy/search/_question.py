@@ -32,8 +32,8 @@ class Shown(NamedTuple):
 
 
 class FittedSpeed(NamedTuple):
-    """The fitted reference speed of a term, and the standard errors of the strengths of
-    the term that result from the error of the speed.
+    """The fitted reference speed of a term, and the standard errors of all fitted
+    values that result from the error of the speed, by label.
     """
 
     term: str

@@ -14,8 +14,9 @@ from ._question import FittedSpeed, Question
 from ._trials import Trial, Trials
 
 
-# relative change of the speed for second differences of the cost
-_CHANGE = 0.1
+# relative changes of the speed for the parabolas through the cost near its minimum,
+# each about the vertex of the one before
+_CHANGES = (0.1, 0.03)
 
 
 def _approach(impacts: Impacts, term: Term) -> np.ndarray:
@@ -67,10 +68,12 @@ def with_fitted_speed(
     usual = fitted(math.log(getattr(question.references, term.reference_speed))).cost
     if not found.fun + price < usual:
         return None
-    near = [fitted(float(found.x) + change) for change in (-_CHANGE, 0.0, _CHANGE)]
-    return dataclasses.replace(
-        with_speed(float(found.x)), fitted_speed=_of_fits(term, float(found.x), near)
-    )
+    best_speed = float(found.x)
+    for change in _CHANGES:
+        near = [fitted(best_speed + step) for step in (-change, 0.0, change)]
+        speed = _of_fits(term, best_speed, near, change)
+        best_speed = math.log(speed.speed.value)
+    return dataclasses.replace(with_speed(best_speed), fitted_speed=speed)
 
 
 def _unstated(term: Term, question: Question, best: Trial) -> bool:
@@ -88,18 +91,27 @@ def _with_strengths_only(trials: Trials, best: Trial) -> Trial | None:
     return trials.known.get(names) or trials.attempt(names, best)
 
 
-def _of_fits(term: Term, logarithm: float, near: list[Fit]) -> FittedSpeed:
-    """Return a fitted speed with its standard error, from fits with speeds near it."""
+def _of_fits(
+    term: Term, logarithm: float, near: list[Fit], change: float
+) -> FittedSpeed:
+    """Return the speed with the least cost, with its standard error, from fits with a
+    lower, the same and a higher speed.
+
+    **Arguments:** the term, the logarithm of the speed, and the change in it.
+    """
     less, here, more = (one.cost for one in near)
     # the cost is minus twice the log-likelihood
-    curvature = (less - 2 * here + more) / _CHANGE**2
-    error = math.sqrt(2 / curvature) if curvature > 0 else math.inf
+    curvature = (less - 2 * here + more) / change**2
+    if curvature > 0:
+        error = math.sqrt(2 / curvature)
+        vertex = (less - more) / (2 * change * curvature)
+        logarithm += min(max(vertex, -change), change)
+    else:
+        error = math.inf
     speed = math.exp(logarithm)
     errors = {
-        one.name: abs(near[2][one.name].value - near[0][one.name].value)
-        / (2 * _CHANGE)
-        * error
-        for one in term.strengths()
+        one.label: abs(one.value - before.value) / (2 * change) * error
+        for one, before in zip(near[2].estimates, near[0].estimates, strict=True)
     }
     unit = term.written("[q]/s")
     return FittedSpeed(term.name, Value(speed, error * speed, unit), errors)
