@@ -1,6 +1,8 @@
 """A restitution law whose reference speed the rig file does not state."""
 
 import dataclasses
+import math
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -17,7 +19,9 @@ from jaxcam.discrepancy.search import (
     Trials,
     with_fitted_speed,
 )
+from jaxcam.discrepancy.search._reference_speed import _of_fits
 from jaxcam.discrepancy.terms import system_with_terms
+from jaxcam.discrepancy.terms._restitution import RestitutionVelocity
 from jaxcam.fitting import Fit, fit, Model, Parameter, Problem, segment_by_model, Sensor
 from jaxcam.recordings import Recording
 
@@ -137,6 +141,30 @@ def test_the_law_is_drawn_over_the_approach_speeds(drops):
     edges = axis.collections[1].get_paths()[0].vertices[:, 1]
     assert np.max(edges) == pytest.approx(np.max(expected + 2 * error), rel=1e-6)
     plt.close(figure)
+
+
+@pytest.mark.parametrize("change", [0.1, 0.03])
+def test_the_speed_is_the_vertex_of_a_parabola_through_costs(change, unchecked_types):
+    """For a quadratic cost, exactly, with the error of the speed and of a value that
+    changes by 0.4 times its logarithm; a far vertex is approached by one step.
+    """
+    term = RestitutionVelocity(motion_unit="m")
+
+    def found(vertex):
+        def fit_at(step):
+            rb = SimpleNamespace(label="rb", value=0.1 + 0.4 * step)
+            cost = 10.0 + 800.0 * (step - vertex) ** 2
+            return SimpleNamespace(cost=cost, estimates=(rb,))
+
+        near = [fit_at(step) for step in (-change, 0.0, change)]
+        return _of_fits(term, math.log(2.0), near, change)  # pyright: ignore
+
+    one = found(0.01)
+    assert one.speed.value == pytest.approx(2.0 * math.exp(0.01), rel=1e-9)
+    assert one.speed.stderr == pytest.approx(one.speed.value / math.sqrt(800), rel=1e-9)
+    assert one.errors["rb"] == pytest.approx(0.4 / math.sqrt(800), rel=1e-9)
+    far = found(5.0).speed.value
+    assert far == pytest.approx(2.0 * math.exp(change), rel=1e-9)
 
 
 @pytest.mark.slow
