@@ -100,6 +100,16 @@ EFFECTS = {
         0.15,
         0.5,
     ),
+    "double_well": _force(_AT_PLACE, lambda u, w, phi, t, s: u - 2.2 * u**3, 0.06, 0.2),
+    "two_wells": _force(
+        _AT_PLACE,
+        lambda u, w, phi, t, s: (
+            np.exp(-(((u - 0.45) / 0.12) ** 2))
+            - 0.7 * np.exp(-(((u + 0.3) / 0.15) ** 2))
+        ),
+        0.04,
+        0.12,
+    ),
     # of velocity
     "fast_drag": _force(
         _AT_SPEED,
@@ -134,6 +144,10 @@ EFFECTS = {
         0.05,
         0.15,
     ),
+    "fat_friction": _force(
+        _ON_THE_WAY, lambda u, w, phi, t, s: -direction(w) * u**2, 0.02, 0.06
+    ),
+    "centrifugal": _force(_ON_THE_WAY, lambda u, w, phi, t, s: u * w**2, 0.1, 0.3),
     # products of two functions of one argument
     "zone_damper": _force(
         _ON_THE_WAY, lambda u, w, phi, t, s: -w * _within(u, 0.1, 0.6), 0.05, 0.15
@@ -183,6 +197,12 @@ EFFECTS = {
         0.01,
         0.03,
     ),
+    "burst": _force(
+        ("time",), lambda u, w, phi, t, s: _within(t, 0.3, 0.45), 0.03, 0.08
+    ),
+    "stiff_later": _force(
+        ("time", "position"), lambda u, w, phi, t, s: -u * (t > 0.5), 0.05, 0.15
+    ),
     # with memory
     "relaxing": _force(
         ("memory",),
@@ -230,6 +250,15 @@ EFFECTS = {
         lambda u, w, phi, t, s: -np.cos(phi - 1.0),
         (0.04, 0.12),
     ),
+    "crack": Effect(
+        "restitution", ("time",), lambda u, w, phi, t, s: -1.0 * (t > 0.5), (0.05, 0.15)
+    ),
+    "expo_rest": Effect(
+        "restitution",
+        ("speed",),
+        lambda u, w, phi, t, s: -np.exp(-s / 0.25),
+        (0.05, 0.15),
+    ),
     # at the surface
     "thermal": Effect(
         "surface", ("time",), lambda u, w, phi, t, s: 1 - np.exp(-3 * t), (8.0, 25.0)
@@ -240,12 +269,18 @@ EFFECTS = {
         lambda u, w, phi, t, s: -np.exp(12 * (np.cos(phi - 2.5) - 1)),
         (5.0, 20.0),
     ),
+    "shifted_wall": Effect(
+        "surface", ("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.5), (8.0, 25.0)
+    ),
     # in the sensor
     "off_centre": Effect(
         "sensor",
         ("position",),
         lambda u, w, phi, t, s: np.sin(2 * np.pi * 0.8 * u + 0.4),
         (3.0, 10.0),
+    ),
+    "bent_scale": Effect(
+        "sensor", ("position",), lambda u, w, phi, t, s: u**2, (4.0, 12.0)
     ),
     "drift": Effect(
         "sensor", ("time",), lambda u, w, phi, t, s: np.sin(2.2 * t), (6.0, 20.0)
