@@ -260,6 +260,32 @@ def test_a_law_at_another_gap_is_named_there(unchecked_types):
     assert found.location == ("x1", "constraint 1")
 
 
+def test_laws_at_several_gaps_are_named_at_all_gaps(unchecked_types):
+    """Both unnamed laws together leave only noise; one location is tried."""
+    laws = tuple(
+        SimpleNamespace(gap=f"constraint {k}", kind="restitution", arguments=("speed",))
+        for k in (0, 1)
+    )
+    tried = []
+
+    def ask(location):
+        tried.append(location)
+        effects = (SimpleNamespace(term=True),)
+        return _Found(1005.0, Verdict.EFFECT, effects=effects)
+
+    unnamed = _Found(1010.0, missing=laws)
+    assert law_elsewhere(unnamed)  # pyright: ignore
+    found = sought_elsewhere(unnamed, ask)  # pyright: ignore
+    assert tried == [Location(0, EVERY)]
+    assert found.location == ("x1", "every gap")
+
+
+def test_a_law_at_the_only_gap_is_not_elsewhere(unchecked_types):
+    """With one gap, functions do not name it."""
+    law = SimpleNamespace(gap="", kind="restitution", arguments=("speed",))
+    assert not law_elsewhere(_Found(1010.0, missing=(law,)))  # pyright: ignore
+
+
 def test_terms_of_ones_own_are_not_moved_to_other_gaps(unchecked_types):
     """They have a gap of their own: only the other coordinate is tried."""
     tried = []

@@ -99,6 +99,35 @@ def test_impacts_elsewhere_determine_nothing():
     )
 
 
+def test_values_far_outside_their_tolerances_are_refused():
+    """Half the amplitude, known to 5 %."""
+    omega, phase = RUNS[1]
+    _, run = measured(omega, phase)
+    nominal, tolerances = np.array([0.002, phase]), np.array([1e-4, 0.1])
+    gap = run["height_m"] - 0.002 * np.sin(omega * run.time + phase)
+    points = gap_points(run.time, gap[None], np.array([0.01]), run.interval)
+    at = gaps_of(run, omega, points)
+    assert fitted_to_impacts(points, at, nominal, tolerances) is None
+    wider = np.array([2e-3, 0.1])
+    assert fitted_to_impacts(points, at, nominal, wider) is not None
+
+
+def test_values_that_the_impacts_do_not_determine_are_refused():
+    """The sum of two offsets of the table, both unknown."""
+    omega, phase = RUNS[1]
+    _, run = measured(omega, phase)
+    gap = run["height_m"] - 0.00408 * np.sin(omega * run.time + phase)
+    points = gap_points(run.time, gap[None], np.array([0.01]), run.interval)
+
+    def at(values):
+        here = np.interp(points.time, run.time, gap) - values[0] - values[1]
+        return here, np.full((len(points.time), 2), -1.0)
+
+    unknown = np.full(2, np.inf)
+    assert fitted_to_impacts(points, at, np.zeros(2), unknown) is None
+    assert fitted_to_impacts(points, at, np.zeros(2), np.array([1.0, 0.0])) is not None
+
+
 @pytest.mark.parametrize(("omega", "phase"), RUNS)
 def test_impacts_and_rests_are_found(omega, phase):
     """With the phase 0 in the model, all impacts faster than 0.15 m/s are found at
@@ -144,7 +173,7 @@ def test_a_gap_that_no_impact_shows_keeps_its_error():
     lid = Parameter("lid", lambda m: m.system.lid, tolerance=2e-3)
     states = np.stack([run["height_m"], np.zeros(len(run))], axis=1)
     picks = {0: "height_m"}
-    gaps, _, errors, _ = measured_gaps(
+    gaps, _, errors, _, _ = measured_gaps(
         model, (*PARAMETERS, lid), run, states, None, picks
     )
     assert gaps.shape == (2, len(run))

@@ -114,7 +114,7 @@ def diagnose(
         again = asked(recordings, folder, lags=lags, before=first.named)
         better = more_accurate(again.diagnosis, first.diagnosis)
         first, lags = (again, lags) if better else (first, {})
-    found = first.diagnosis
+    found, library = first.diagnosis, candidates in (None, "extended")
     odd = odd_record(found.after, policy)
     if odd is not None:
         conditions.report(f"repeating the diagnosis without {odd}", None)
@@ -122,8 +122,8 @@ def diagnose(
         folder = None if keep is None else keep / "without_one"
         again = asked(others, folder, lags=lags, before=first)
         found = _without_or_with(odd, first, again.diagnosis)
-    elif falls_short(found) or law_elsewhere(found):
-        found = sought_elsewhere(found, asked_at, candidates in (None, "extended"))
+    elif falls_short(found) or library and law_elsewhere(found):
+        found = sought_elsewhere(found, asked_at, library)
     if keep is not None and not conditions.clock.stopped:
         # with more time, an interrupted search may continue from its fits
         shutil.rmtree(keep, ignore_errors=True)

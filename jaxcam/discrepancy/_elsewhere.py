@@ -28,18 +28,27 @@ def law_elsewhere(found: Diagnosis) -> bool:
     """Return whether an unnamed law of restitution was found at a gap other than the
     first. The library has such laws, but they were sought at the first gap alone.
     """
-    return bool(_gaps_with_law(found))
+    return bool(_suggested(found))
 
 
-def _gaps_with_law(found: Diagnosis) -> set[str]:
-    """Return the names of the gaps other than the first with an unnamed law."""
-    system = found.after.problem.model.system
+def _suggested(found: Diagnosis) -> list[Location]:
+    """Return the location of the unnamed laws of restitution, if it is not the first
+    gap alone: all gaps if there are several laws.
+    """
+    problem = found.after.problem
     laws = {
         one.gap
         for one in found.missing
         if one.kind == "restitution" and one.arguments == ("speed",)
     }
-    return laws - {system.constraint_name(0), None}
+    if len(laws) > 1:
+        return [Location(constraint=EVERY)]
+    name = problem.model.system.constraint_name
+    return [
+        one
+        for one in other_locations(problem)
+        if one.constraint > 0 and name(one.constraint) in laws
+    ]
 
 
 def _left(found: Diagnosis) -> float:
@@ -73,11 +82,11 @@ def sought_elsewhere(
     problem = found.after.problem
     system = problem.model.system
     assert isinstance(system, WithTerms)
-    locations = [one for one in other_locations(problem) if one.coordinate or library]
-    laws = _gaps_with_law(found)
-    pairs = system.coordinates
-    # first, the gap at which an unnamed law was found
-    locations.sort(key=lambda one: one.said(system, pairs)[1] not in laws)
+    suggested = _suggested(found) if library else []
+    others = [one for one in other_locations(problem) if one.coordinate or library]
+    locations = suggested + [one for one in others if one not in suggested]
+    if not falls_short(found):
+        locations = suggested
     best, where = found, Location()
     for location in locations[: found.policy.followed]:
         other = asked(location)

@@ -77,7 +77,7 @@ def _seen_gaps(model, parameters, segments, picks) -> list[_Seen]:
         run = part.recording
         states = measured_states(model, picks, run)
         here = with_constants(model, run)
-        gaps, slopes, errors, _ = measured_gaps(
+        gaps, slopes, errors, _, here = measured_gaps(
             here, tuple(parameters), run, states, part.drive, picks
         )
         for number, row in enumerate(slopes):

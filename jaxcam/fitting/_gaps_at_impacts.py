@@ -26,13 +26,15 @@ _ON, _USUAL = 5.0, 2.0
 _MOST, _MORE = 0.7, 2
 # Jumps of several gaps within this number of sampling intervals are the same jump
 _SAME = 3
+# Largest change of a parameter, in units of its tolerance
+_OUTSIDE = 1.5
 # A tolerance is half the width of a uniform distribution with this standard deviation
 _UNIFORM = np.sqrt(3.0)
 
 
 class GapPoints(NamedTuple):
-    """Impacts: time (s), the gap that closed, its value there with the nominal
-    parameters, and its standard error, `(i,)` each.
+    """Impacts: time (s), the index of the gap that closed, the value that the model's
+    parameters give for it, and its standard error, `(i,)` each.
     """
 
     time: Float[np.ndarray, " i"]
@@ -44,7 +46,7 @@ class GapPoints(NamedTuple):
 class FittedValues(NamedTuple):
     """Values of the parameters `(p,)`, which of them affect the gaps at the impacts,
     `(p,)`, their covariance `(p, p)`, zero for the others, and the gap that remains at
-    each impact, `(i,)`, zero if the impact was left out.
+    each impact, `(i,)`, NaN if the impact was left out.
     """
 
     values: Float[np.ndarray, " p"]
@@ -62,7 +64,7 @@ def gap_points(
     """Return the impacts in a recording.
 
     A jump in velocity belongs to the gap that is closest to zero, relative to its
-    error; it is ignored if no gap can be zero there.
+    largest error; it is ignored if no gap can be zero there.
 
     **Arguments:** the gaps at the samples, and the largest errors of the gaps.
     """
@@ -71,32 +73,38 @@ def gap_points(
         jumps = gap_jumps(time, gap, interval)
         near = np.abs(jumps.gap) < error + _ON * jumps.error
         for i in np.flatnonzero(jumps.close & near):
-            rows.append((jumps.time[i], k, jumps.gap[i], jumps.error[i]))
+            off, stderr = jumps.gap[i], jumps.error[i]
+            rows.append((jumps.time[i], k, off, stderr, abs(off) / (error + stderr)))
     rows.sort()
     best: list[tuple] = []
     for row in rows:
         if not best or row[0] - best[-1][0] > _SAME * interval:
             best.append(row)
-        elif abs(row[2]) / row[3] < abs(best[-1][2]) / best[-1][3]:
+        elif row[-1] < best[-1][-1]:
             best[-1] = row
-    moment, gap, off, stderr = np.array(best, dtype=float).reshape(-1, 4).T
+    moment, gap, off, stderr, _ = np.array(best, dtype=float).reshape(-1, 5).T
     return GapPoints(moment, gap.astype(int), off, stderr)
 
 
 def fitted_to_impacts(
     points: GapPoints,
     gaps_of: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    nominal: Float[np.ndarray, " p"],
+    values: Float[np.ndarray, " p"],
     tolerances: Float[np.ndarray, " p"],
+    nominal: Float[np.ndarray, " p"] | None = None,
+    bounds: tuple[np.ndarray, np.ndarray] = (np.array(-np.inf), np.array(np.inf)),
 ) -> FittedValues | None:
     """Return the parameters with which the gaps vanish at the impacts, or `None` if
-    there are no such parameters, or if the impacts do not determine them.
+    there are none within, or slightly outside, their tolerances, or if the impacts do
+    not determine them.
 
     **Arguments:** `gaps_of(values)` returns the gap at each impact, `(i,)`, and its
-    derivatives with respect to the parameters, `(i, p)`; `tolerances` limit the change
-    of the parameters.
+    derivatives with respect to the parameters, `(i, p)`; the values of the parameters
+    in the model, their tolerances, nominal values (default: those in the model) and
+    bounds.
     """
-    start, slopes = gaps_of(nominal)
+    start, slopes = gaps_of(values)
+    nominal = values if nominal is None else nominal
     reach = np.max(np.abs(slopes), axis=0, initial=0.0)
     fitted = (reach > 0) & (tolerances > 0)
     moving = np.flatnonzero(fitted)
@@ -106,9 +114,9 @@ def fitted_to_impacts(
     known = np.where(np.isfinite(tolerances[moving]), _UNIFORM, 0.0)
 
     def values_of(steps):
-        values = nominal.copy()
-        values[moving] += scale * steps
-        return values
+        moved = nominal.copy()
+        moved[moving] += scale * steps
+        return np.clip(moved, *bounds)
 
     def misfits(steps):
         gap, _ = gaps_of(values_of(steps))
@@ -143,9 +151,13 @@ def fitted_to_impacts(
     on = np.abs(off) < _ON
     if np.median(np.abs(off)) > _USUAL or np.mean(on) < _MOST:
         return None
+    if np.any(np.abs(best.x[known > 0]) > _OUTSIDE):
+        return None
     rows = rates(best.x)[np.append(on, np.ones(len(moving), dtype=bool))]
-    inverse = np.linalg.pinv(rows.T @ rows)
+    if np.linalg.matrix_rank(rows) < len(moving):
+        return None
+    inverse = np.linalg.inv(rows.T @ rows)
     covariance = np.zeros((len(nominal), len(nominal)))
     covariance[np.ix_(moving, moving)] = inverse * np.outer(scale, scale)
-    left = np.where(on, off * points.error, 0.0)
+    left = np.where(on, off * points.error, np.nan)
     return FittedValues(values_of(best.x), fitted, covariance, left)

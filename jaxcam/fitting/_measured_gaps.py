@@ -40,11 +40,11 @@ def measured_gaps(
     model: Model, parameters, recording, states, drive: Drive | None, picks
 ):
     """Return the gaps `(g, k)`, the largest magnitudes of their derivatives with
-    respect to the state `(g, n)`, their errors `(g,)`, and for each its measured rate
-    of change `(k,)` or `None`.
+    respect to the state `(g, n)`, their errors `(g,)`, for each its measured rate of
+    change `(k,)` or `None`, and the model that has these gaps.
 
-    If the surfaces move, and their parameters are uncertain, the gaps are those that
-    vanish at the impacts.
+    If the surfaces move, and their parameters are uncertain, the model is changed so
+    that the gaps vanish at the impacts.
     """
     layout = Layout(model, parameter_places(model, parameters))
     values = np.array([float(p.where(model)) for p in parameters])
@@ -72,13 +72,20 @@ def measured_gaps(
     if _moves(layout.at(jnp.asarray(values)), states) and np.any(errors > 0):
         points = gap_points(recording.time, gaps, errors, recording.interval)
         at = _at_points(layout, points, (recording.time, states, *moving))
-        found = fitted_to_impacts(points, at, values, tolerances)
+        nominal = [p.nominal for p in parameters]
+        nominal = [v if n is None else n for v, n in zip(values, nominal)]
+        limits = [(p.lower, p.upper) for p in parameters]
+        bounds = np.array(limits).reshape(-1, 2).T
+        found = fitted_to_impacts(
+            points, at, values, tolerances, np.array(nominal), (bounds[0], bounds[1])
+        )
         if found is not None:
             values = found.values
             gaps, by_state, by_value = gaps_and_slopes(values)
             spread = np.einsum("kgp,pq,kgq->kg", by_value, found.covariance, by_value)
-            counts = np.bincount(points.gap, minlength=len(gaps))
-            left = np.bincount(points.gap, found.left**2, minlength=len(gaps))
+            on = np.isfinite(found.left)
+            counts = np.bincount(points.gap[on], minlength=len(gaps))
+            left = np.bincount(points.gap[on], found.left[on] ** 2, len(gaps))
             fitted = np.max(spread, axis=0) + left / np.maximum(counts, 1)
             # an error that other parameters cause remains as it was
             known = np.all((parts == 0) | found.fitted, axis=-1)
@@ -90,7 +97,7 @@ def measured_gaps(
     if len(picks) > 1:
         found = gap_rates(layout, values, tuple(columns), tuple(looks), clear)
         rates = [None if rate is None else rate[:count] for rate in found]
-    return gaps, slopes, errors, rates
+    return gaps, slopes, errors, rates, layout.at(jnp.asarray(values))
 
 
 def _moves(model: Model, states) -> bool:

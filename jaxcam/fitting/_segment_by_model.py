@@ -133,7 +133,7 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
     drive = None if drive_channel is None else read_drive(recording, drive_channel)
     states = measured_states(model, picks, recording)
     here = with_constants(model, recording)
-    gaps, slopes, errors, rates = measured_gaps(
+    gaps, slopes, errors, rates, here = measured_gaps(
         here, parameters, recording, states, drive, picks
     )
     shown = np.any(slopes != 0, axis=-1)

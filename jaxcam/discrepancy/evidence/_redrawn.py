@@ -129,10 +129,9 @@ def needs(
             kept[name] += bool(left[name] > 0)
     spread = np.std(np.array(estimates), axis=0)
     deviation = dict.fromkeys(found.free, 0.0)
-    # a value of one recording does not vary over samples of recordings
-    shared = {name for name in blocks.names if blocks.names.count(name) == 1}
     for k, s in zip(free, spread):
-        if blocks.names[k] in shared:
+        # a sample may lack the recording that determines a value of its own
+        if not problem.parameter(blocks.names[k]).per_record:
             deviation[blocks.names[k]] = float(s)
     shares = {name: k / policy.bootstrap for name, k in kept.items()}
     net = lost(None)[1]

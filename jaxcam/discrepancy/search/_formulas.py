@@ -149,18 +149,21 @@ class _Trials:
             done.add(form.name)
             self.progress(f"fitting a formula: {form.name}", None)
             trial = self._fitted(start)
-            if trial is None or not _sound(trial, self.one):
+            if trial is None:
+                continue
+            fitted: Free = _in_slot(trial, self.one.slot)  # pyright: ignore
+            numbers = _numbers_of(trial, fitted).tolist()
+            # an edge outside the range is not valid, and is not needed
+            for special in form.special:
+                if all(map(math.isfinite, numbers)) and special.applies(numbers):
+                    own = np.array(special.numbers(numbers))
+                    waiting.insert(0, Start(gain, special.form, own))
+            if not _sound(trial, self.one):
                 continue
             self.sound.append(trial)
             if trial.score < self.found.score:
                 # only a form with a similar predicted gain may have more evidence
                 least = max(least, gain - self.fits.policy.lead_bic)
-            fitted: Free = _in_slot(trial, self.one.slot)  # pyright: ignore
-            numbers = _numbers_of(trial, fitted).tolist()
-            for special in form.special:
-                if special.applies(numbers):
-                    own = np.array(special.numbers(numbers))
-                    waiting.insert(0, Start(gain, special.form, own))
 
     def may_do(self, start: Start, likelihood: CurveLikelihood) -> bool:
         """Return whether a form is expected to have about as much evidence as the

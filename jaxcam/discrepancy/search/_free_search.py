@@ -193,13 +193,13 @@ class FreeSearch:
         ]
 
     def _ties(self, label: str, chosen: str) -> bool:
-        """Return whether single pieces of flight do not distinguish a function from the
-        chosen one.
+        """Return whether single pieces of flight do not clearly prefer the chosen
+        function to another one.
         """
         if label not in self.alone or chosen not in self.alone:
             return False
         one, other = self.alone[label], self.alone[chosen]
-        return abs(one.score - other.score) < self.policy.tie * heat_of(other.fit)
+        return one.score < other.score + self.policy.tie * heat_of(other.fit)
 
     def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
         """Return the fit with another function alone, or `None` if it fails.

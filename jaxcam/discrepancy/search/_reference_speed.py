@@ -14,9 +14,10 @@ from ._question import FittedSpeed, Question
 from ._trials import Trial, Trials
 
 
-# relative changes of the speed for the parabolas through the cost near its minimum,
-# each about the vertex of the one before
-_CHANGES = (0.1, 0.03)
+# relative change of the speed for a parabola through the cost near its minimum; that
+# for the second one, about the vertex of the first, in standard errors, and its minimum
+_CHANGE = 0.1
+_SECOND, _SMALLEST = 3.0, 0.01
 
 
 def _approach(impacts: Impacts, term: Term) -> np.ndarray:
@@ -68,11 +69,17 @@ def with_fitted_speed(
     usual = fitted(math.log(getattr(question.references, term.reference_speed))).cost
     if not found.fun + price < usual:
         return None
-    best_speed = float(found.x)
-    for change in _CHANGES:
-        near = [fitted(best_speed + step) for step in (-change, 0.0, change)]
-        speed = _of_fits(term, best_speed, near, change)
-        best_speed = math.log(speed.speed.value)
+
+    def about(logarithm: float, change: float) -> FittedSpeed:
+        near = [fitted(logarithm + step) for step in (-change, 0.0, change)]
+        return _of_fits(term, logarithm, near, change)
+
+    speed = about(float(found.x), _CHANGE)
+    error = speed.speed.stderr / speed.speed.value
+    if _SECOND * error < _CHANGE:
+        change = max(_SECOND * error, _SMALLEST)
+        speed = about(math.log(speed.speed.value), change)
+    best_speed = math.log(speed.speed.value)
     return dataclasses.replace(with_speed(best_speed), fitted_speed=speed)
 
 
@@ -109,9 +116,10 @@ def _of_fits(
     else:
         error = math.inf
     speed = math.exp(logarithm)
-    errors = {
-        one.label: abs(one.value - before.value) / (2 * change) * error
+    moved = {
+        one.label: abs(one.value - before.value) / (2 * change)
         for one, before in zip(near[2].estimates, near[0].estimates, strict=True)
     }
+    errors = {label: rate * error for label, rate in moved.items() if rate > 0}
     unit = term.written("[q]/s")
     return FittedSpeed(term.name, Value(speed, error * speed, unit), errors)

@@ -15,7 +15,7 @@ from ._parametric_form import Place, Primitive, Special
 _EDGE = 0.004
 # An edge within this fraction of the range from its end may not be needed
 _AT_END = 0.1
-# Smallest exponent of a distance: with a smaller one, the form is a step
+# Smallest exponent: with a smaller one, the form is a step
 _FLATTEST = 0.2
 # Smallest argument of a power, as a fraction of the range, so that its derivatives
 # exist
@@ -121,6 +121,7 @@ POWER = Primitive(
     lambda at, p: p[0] * at.xp.maximum(at.u, _LEAST) ** p[1],
     ((0.5, 1.5, 2.0, 3.0),),
     (0.2,),
+    limits=((1, _FLATTEST),),
     special=(_without_exponent(STRAIGHT),),
 )
 SETTLING = Primitive(
@@ -205,7 +206,7 @@ POWER_OF_SPEED = Primitive(
     ((0.5, 1.5, 2.0, 3.0, 4.0),),
     (0.2,),
     odd=True,
-    limits=((1, 0.0),),
+    limits=((1, _FLATTEST),),
 )
 HARMONICS = tuple(
     Primitive(

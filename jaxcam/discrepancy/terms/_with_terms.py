@@ -86,9 +86,10 @@ class WithTerms(Wrapping):
         gap = self.base.gap(t, state)
         if not gap.size:
             return gap
-        for number in self._numbers(Where.CONTACT):
-            raised = self._raised(t, number)
-            gap = gap - raised if gap.ndim == 0 else gap.at[number].add(-raised)
+        for number in range(gap.size):
+            if self._acting(Where.CONTACT, number):
+                raised = self._raised(t, number)
+                gap = gap - raised if gap.ndim == 0 else gap.at[number].add(-raised)
         return gap
 
     def impact(self, t, state) -> jax.Array:

@@ -40,7 +40,8 @@ def segment_case(
         rig: The rig, with nominal geometry, tolerances and sensors.
         channel: The channel of the follower.
         surface: The surface of the cam, if known; by default, it is estimated from the
-            impacts and contacts of all recordings.
+            impacts and contacts of all recordings, and so is a displacement of the
+            surface in the course of time.
         progress: Called with the completed fraction.
 
     Returns:

@@ -3,34 +3,38 @@ recordings.
 
 A support that warms up and a sensor that drifts displace impacts and contacts in the
 course of time. Impacts at the same angle of the cam reveal this displacement. It is a
-random walk in time between knots, in addition to an error of the profile that all
-recordings share; both have Gaussian priors, and the evidence decides whether there is a
-displacement at all (C. K. I. Williams, C. E. Rasmussen, Gaussian Processes for Machine
-Learning, 2006, section 5.4.1).
+random walk in time between knots, in addition to an offset of each recording and to an
+error of the profile that all recordings share; all have Gaussian priors, and the
+evidence decides whether there is a displacement at all (C. K. I. Williams, C. E.
+Rasmussen, Gaussian Processes for Machine Learning, 2006, section 5.4.1).
 """
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from .._drive import Drive
 from .._recording import Recording
+from ._bend import spread, WAVES, waves
 from ._impact_points import SurfacePoints
 from ._surface import Surface
 
 
-# Highest harmonic of the common profile error, and its prior standard deviation
-# relative to that of the points
-_HIGHEST = 6
-_PROFILE = 10.0
+# Correlation lengths (rad) of the common profile error to try, and its prior standard
+# deviation, relative to that of the points
+_LENGTHS = (0.2, 0.5, 1.0, 2.0)
+_COMMON = 10.0
+# Prior standard deviation of the offset of a recording, in units of the noise
+_OFFSET = 3.0
 # Knots for each turn of the drive, and their largest number in a recording
 _DENSE, _KNOTS = 2, 33
-# Standard deviations of the change from one knot to the next to try, and of the first
-# value relative to this, in units of the noise
+# Standard deviations of the change from one knot to the next to try, in units of the
+# noise
 _STEPS = (0.3, 1.0, 3.0, 10.0)
-_FIRST = 2.0
 # Required gain of a displacement in twice the log-likelihood, as for a bend of the cam
 _SURE = 30.0
 # Points further from the fit than this number of standard errors, or of robust standard
@@ -51,29 +55,32 @@ class _Unknowns(NamedTuple):
     rows: Float[np.ndarray, "n p"]
     off: Float[np.ndarray, " n"]
     size: float
+    offset: float
 
-    def prior(self, step: float) -> Float[np.ndarray, "p p"]:
+    def prior(self, length: float, step: float) -> Float[np.ndarray, "p p"]:
         """Return a matrix that times its transpose is the prior covariance.
 
-        **Arguments:** the standard deviation of the change between two knots.
+        **Arguments:** the correlation length of the profile error, and the standard
+        deviation of the change between two knots.
         """
         count = self.rows.shape[1]
         found = np.zeros((count, count))
-        first = 2 * _HIGHEST + 1
-        found[range(first), range(first)] = self.size
+        found[range(WAVES), range(WAVES)] = self.size * spread(length)
+        first = WAVES
         for knots in self.knots:
             last = first + len(knots)
             walk = np.tril(np.full((len(knots), len(knots)), step))
-            walk[:, 0] *= _FIRST
+            # the offset of the recording
+            walk[:, 0] = self.offset
             found[first:last, first:last] = walk
             first = last
         return found
 
-    def solved(self, step: float, kept: Int[np.ndarray, " m"]):
+    def solved(self, length: float, step: float, kept: Int[np.ndarray, " m"]):
         """Return twice the logarithm of the evidence, apart from a constant, and the
         most likely coefficients, given the points with the indices `kept`.
         """
-        prior = self.prior(step)
+        prior = self.prior(length, step)
         inside = self.rows[kept] @ prior
         matrix = np.eye(len(prior)) + inside.T @ inside
         target = inside.T @ self.off[kept]
@@ -83,7 +90,7 @@ class _Unknowns(NamedTuple):
 
     def moved(self, found) -> list[Float[np.ndarray, " k"]]:
         """Return the displacement at the knots of each recording, zero on average."""
-        ends = np.cumsum([2 * _HIGHEST + 1, *map(len, self.knots)])
+        ends = np.cumsum([WAVES, *map(len, self.knots)])
         values = found[ends[0] :] - np.mean(found[ends[0] :])
         return np.split(values, (ends[1:] - ends[0])[:-1])
 
@@ -106,8 +113,8 @@ def surface_drifts(
     unknowns = _unknowns(recordings, drives, surface, points, noise)
     steps = [step * noise for step in _STEPS]
     kept = _without_outliers(unknowns, steps[2])
-    still, _ = unknowns.solved(0.0, kept)
-    tried = [unknowns.solved(step, kept) for step in steps]
+    still = max(unknowns.solved(length, 0.0, kept)[0] for length in _LENGTHS)
+    tried = [unknowns.solved(*one, kept) for one in itertools.product(_LENGTHS, steps)]
     best, found = max(tried, key=lambda one: one[0])
     if best < still + _SURE:
         return None
@@ -128,21 +135,22 @@ def _unknowns(
         count = int(np.clip(round(_DENSE * turns) + 1, 2, _KNOTS))
         knots.append(np.linspace(recording.time[0], recording.time[-1], count))
     total, first, rows, off, error = sum(map(len, knots)), 0, [], [], []
-    orders = np.arange(1, _HIGHEST + 1)
     for own, places in zip(points, knots):
-        waves = np.outer(own.turned, orders)
         moved = np.zeros((len(own.time), total))
         for k, unit in enumerate(np.eye(len(places))):
             moved[:, first + k] = np.interp(own.time, places, unit)
         first += len(places)
-        ones = np.ones((len(own.time), 1))
-        rows.append(np.hstack([ones, np.cos(waves), np.sin(waves), moved]))
+        rows.append(np.hstack([np.asarray(waves(jnp.asarray(own.turned))), moved]))
         off.append(own.angle - np.asarray(surface.angle(own.turned)))
         error.append(np.hypot(own.error, noise))
     joined, errors = np.concatenate(off), np.concatenate(error)
-    size = _PROFILE * max(float(np.std(joined)), noise)
+    size = _COMMON * max(float(np.std(joined)), noise)
     return _Unknowns(
-        knots, np.concatenate(rows) / errors[:, None], joined / errors, size
+        knots,
+        np.concatenate(rows) / errors[:, None],
+        joined / errors,
+        size,
+        _OFFSET * noise,
     )
 
 
@@ -150,7 +158,7 @@ def _without_outliers(unknowns: _Unknowns, step: float) -> Int[np.ndarray, " m"]
     """Return the indices of the points near the fit with a flexible displacement."""
     kept = np.arange(len(unknowns.off))
     for _ in range(_PASSES):
-        _, found = unknowns.solved(step, kept)
+        _, found = unknowns.solved(_LENGTHS[0], step, kept)
         left = np.abs(unknowns.off - unknowns.rows @ found)
         spread = max(1.0, float(np.median(left[kept])) / 0.6745)
         near = np.flatnonzero(left < _FAR * spread)
