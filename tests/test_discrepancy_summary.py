@@ -49,7 +49,7 @@ def test_a_value_at_the_limit_of_its_tolerance_is_said(value, said):
 
 
 def test_values_that_differ_between_recordings_are_all_reported():
-    question = SimpleNamespace(rig=("phase",), shown={})
+    question = SimpleNamespace(rig=("phase",), shown={}, fitted_speed=None)
     rows = [Estimate("phase", v, 0.01, "rad", r) for v, r in ((0.5, "a"), (1.1, "b"))]
     fitted = Fitted(*rows)
     question.problem = fitted.problem
