@@ -134,6 +134,8 @@ def _ended(gravity: float, ratio: float, reasons=()):
     """A fit with one parameter (9.81 +- 0.02) and one channel."""
     parameter = SimpleNamespace(tolerance=0.02, nominal=9.81)
     problem = SimpleNamespace(
+        names=("gravity",),
+        parameters=(parameter,),
         parameter=lambda name: parameter,
         samples=9,
         records=("a", "b"),
