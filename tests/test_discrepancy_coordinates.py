@@ -11,8 +11,9 @@ import pytest
 import jaxcam
 from jaxcam.discrepancy import library, Policy, strength, Term
 from jaxcam.discrepancy.search import system_question
-from jaxcam.discrepancy.terms import coordinates, moves_surface, WithTerms
+from jaxcam.discrepancy.terms import coordinates, WithTerms
 from jaxcam.fitting import Parameter, Sensor
+from jaxcam.fitting.engine import moves_surface
 from jaxcam.hybrid import HybridSystem
 from jaxcam.models import BouncingBall, CamFollower, ImpactOscillator
 from jaxcam.recordings import Recording, segment

@@ -14,6 +14,7 @@ from jaxcam.discrepancy.report._curves import errors_of, graded, level_of
 from jaxcam.discrepancy.report._missing import _words
 from jaxcam.discrepancy.search import _free_fits, occam, roughness
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
+from jaxcam.discrepancy.search._free_search import FreeSearch
 from jaxcam.discrepancy.terms import (
     Factor,
     families,
@@ -351,3 +352,21 @@ def test_a_fit_is_made_only_once():
         (other, start(1.0), None, 5.0),
     ]
     assert [fits.fitted(*each) for each in others] == [2, 3, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("score", "ties"), [(900.0, True), (1019.0, True), (1021.0, False)]
+)
+def test_a_function_that_single_pieces_do_not_exclude_ties(score, ties):
+    """The chosen one has a score of 1000 and a cost of twice the noise: up to twice
+    `Policy.tie` above it, and if it is better.
+    """
+
+    def alone(score):
+        fit = SimpleNamespace(cost=2000.0, problem=SimpleNamespace(samples=1000))
+        return SimpleNamespace(score=score, fit=fit)
+
+    fits = {"sensor": alone(1000.0), "surface": alone(score)}
+    search = SimpleNamespace(policy=Policy(), alone=fits)
+    assert FreeSearch._ties(search, "surface", "sensor") == ties  # pyright: ignore
+    assert not FreeSearch._ties(search, "force", "sensor")  # pyright: ignore

@@ -97,6 +97,7 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_RESOLVED",
         # the forms of free functions, and where a fit of them may start
         "_EDGE",
+        "_EDGE_OF_PHASE",
         "_FLATTEST",
         "EVERY",
         "_AT_END",

@@ -1,5 +1,6 @@
 """A ball on a shaken table whose phase is unknown: the impacts determine it."""
 
+import dataclasses
 import functools
 
 import equinox as eqx
@@ -77,10 +78,10 @@ def gaps_of(run: Recording, omega, points: GapPoints):
 def test_impacts_determine_the_phase(omega, phase):
     """To 0.02 rad and 1 % of the amplitude, and to four standard deviations."""
     _, run = measured(omega, phase)
-    nominal, tolerances = np.array([0.004, 0.0]), np.array([2e-4, 3.2])
     gap = run["height_m"] - 0.004 * np.sin(omega * run.time)
     points = gap_points(run.time, gap[None], np.array([0.013]), run.interval)
-    found = fitted_to_impacts(points, gaps_of(run, omega, points), nominal, tolerances)
+    at = gaps_of(run, omega, points)
+    found = fitted_to_impacts(points, at, PARAMETERS, np.array([0.004, 0.0]))
     assert found is not None
     off = found.values - [0.00408, phase]
     assert np.all(np.abs(off) < [4e-5, 0.02])
@@ -92,24 +93,25 @@ def test_impacts_elsewhere_determine_nothing():
     rng = np.random.default_rng(5)
     time = np.sort(rng.uniform(0.0, 2.0, 30))
     run = Recording("none", time, {"height_m": rng.uniform(-0.004, 0.004, 30)})
-    points = GapPoints(time, np.zeros(30, int), run["height_m"], np.full(30, NOISE))
+    nominal = np.array([0.004, 0.0])
+    off = run["height_m"] - 0.004 * np.sin(60.0 * time)
+    points = GapPoints(time, np.zeros(30, int), off, np.full(30, NOISE))
     at = gaps_of(run, 60.0, points)
-    assert (
-        fitted_to_impacts(points, at, np.array([4e-3, 0]), np.array([2e-4, 3])) is None
-    )
+    assert fitted_to_impacts(points, at, PARAMETERS, nominal) is None
 
 
 def test_values_far_outside_their_tolerances_are_refused():
     """Half the amplitude, known to 5 %."""
     omega, phase = RUNS[1]
     _, run = measured(omega, phase)
-    nominal, tolerances = np.array([0.002, phase]), np.array([1e-4, 0.1])
+    nominal = np.array([0.002, phase])
     gap = run["height_m"] - 0.002 * np.sin(omega * run.time + phase)
     points = gap_points(run.time, gap[None], np.array([0.01]), run.interval)
     at = gaps_of(run, omega, points)
-    assert fitted_to_impacts(points, at, nominal, tolerances) is None
-    wider = np.array([2e-3, 0.1])
-    assert fitted_to_impacts(points, at, nominal, wider) is not None
+    for tolerance, determined in ((1e-4, False), (2e-3, True)):
+        known = dataclasses.replace(PARAMETERS[0], tolerance=tolerance), PARAMETERS[1]
+        found = fitted_to_impacts(points, at, known, nominal)
+        assert (found is not None) == determined
 
 
 def test_values_that_the_impacts_do_not_determine_are_refused():
@@ -123,9 +125,26 @@ def test_values_that_the_impacts_do_not_determine_are_refused():
         here = np.interp(points.time, run.time, gap) - values[0] - values[1]
         return here, np.full((len(points.time), 2), -1.0)
 
-    unknown = np.full(2, np.inf)
-    assert fitted_to_impacts(points, at, np.zeros(2), unknown) is None
-    assert fitted_to_impacts(points, at, np.zeros(2), np.array([1.0, 0.0])) is not None
+    unknown = [Parameter(name, lambda m: m.system.phase) for name in ("a", "b")]
+    assert fitted_to_impacts(points, at, unknown, np.zeros(2)) is None
+    known = dataclasses.replace(unknown[0], tolerance=1.0)
+    assert fitted_to_impacts(points, at, (known, unknown[1]), np.zeros(2)) is not None
+
+
+def test_values_respect_bounds_and_stated_nominal_values():
+    """An unknown amplitude is positive, and the phase is near its nominal value, which
+    is not that of the model.
+    """
+    omega, phase = RUNS[1]
+    _, run = measured(omega, phase)
+    gap = run["height_m"] - 0.004 * np.sin(omega * run.time)
+    points = gap_points(run.time, gap[None], np.array([0.013]), run.interval)
+    amplitude = Parameter("amplitude", lambda m: m.system.amplitude, lower=0.0)
+    near = dataclasses.replace(PARAMETERS[1], nominal=phase + 0.1, tolerance=0.2)
+    at = gaps_of(run, omega, points)
+    found = fitted_to_impacts(points, at, (amplitude, near), np.array([0.004, 0.0]))
+    assert found is not None
+    assert np.all(np.abs(found.values - [0.00408, phase]) < [4e-5, 0.02])
 
 
 @pytest.mark.parametrize(("omega", "phase"), RUNS)

@@ -6,7 +6,8 @@ the phase is unknown.
 """
 
 import itertools
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.optimize import least_squares
 
 from ..recordings.cut import gap_jumps
+from .engine import Parameter
 
 
 # Number of values, spread evenly over the tolerance, from which the most influential
@@ -28,8 +30,6 @@ _MOST, _MORE = 0.7, 2
 _SAME = 3
 # Largest change of a parameter, in units of its tolerance
 _OUTSIDE = 1.5
-# A tolerance is half the width of a uniform distribution with this standard deviation
-_UNIFORM = np.sqrt(3.0)
 
 
 class GapPoints(NamedTuple):
@@ -89,34 +89,35 @@ def gap_points(
 def fitted_to_impacts(
     points: GapPoints,
     gaps_of: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+    parameters: Sequence[Parameter],
     values: Float[np.ndarray, " p"],
-    tolerances: Float[np.ndarray, " p"],
-    nominal: Float[np.ndarray, " p"] | None = None,
-    bounds: tuple[np.ndarray, np.ndarray] = (np.array(-np.inf), np.array(np.inf)),
 ) -> FittedValues | None:
     """Return the parameters with which the gaps vanish at the impacts, or `None` if
     there are none within, or slightly outside, their tolerances, or if the impacts do
     not determine them.
 
     **Arguments:** `gaps_of(values)` returns the gap at each impact, `(i,)`, and its
-    derivatives with respect to the parameters, `(i, p)`; the values of the parameters
-    in the model, their tolerances, nominal values (default: those in the model) and
-    bounds.
+    derivatives with respect to the parameters, `(i, p)`; the parameters, and their
+    values in the model.
     """
     start, slopes = gaps_of(values)
-    nominal = values if nominal is None else nominal
     reach = np.max(np.abs(slopes), axis=0, initial=0.0)
-    fitted = (reach > 0) & (tolerances > 0)
-    moving = np.flatnonzero(fitted)
+    moving = np.flatnonzero(reach > 0)
     if not len(moving) or len(points.time) < len(moving) + _MORE:
         return None
-    scale = np.where(np.isfinite(tolerances), tolerances, 1.0)[moving]
-    known = np.where(np.isfinite(tolerances[moving]), _UNIFORM, 0.0)
+    nominal = np.array([p.nominal_in(v) for p, v in zip(parameters, values)])
+    low, high = np.array([(p.lower, p.upper) for p in parameters]).T
+    chosen = [parameters[int(k)] for k in moving]
+    stated = np.array([math.isfinite(one.tolerance) for one in chosen])
+    scale = np.array(
+        [one.tolerance if there else 1.0 for one, there in zip(chosen, stated)]
+    )
+    known = scale / np.array([one.prior_stderr for one in chosen])
 
     def values_of(steps):
         moved = nominal.copy()
         moved[moving] += scale * steps
-        return np.clip(moved, *bounds)
+        return np.clip(moved, low, high)
 
     def misfits(steps):
         gap, _ = gaps_of(values_of(steps))
@@ -151,7 +152,7 @@ def fitted_to_impacts(
     on = np.abs(off) < _ON
     if np.median(np.abs(off)) > _USUAL or np.mean(on) < _MOST:
         return None
-    if np.any(np.abs(best.x[known > 0]) > _OUTSIDE):
+    if np.any(np.abs(best.x[stated]) > _OUTSIDE):
         return None
     rows = rates(best.x)[np.append(on, np.ones(len(moving), dtype=bool))]
     if np.linalg.matrix_rank(rows) < len(moving):
@@ -160,4 +161,4 @@ def fitted_to_impacts(
     covariance = np.zeros((len(nominal), len(nominal)))
     covariance[np.ix_(moving, moving)] = inverse * np.outer(scale, scale)
     left = np.where(on, off * points.error, np.nan)
-    return FittedValues(values_of(best.x), fitted, covariance, left)
+    return FittedValues(values_of(best.x), reach > 0, covariance, left)

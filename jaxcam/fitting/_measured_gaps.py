@@ -5,15 +5,20 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..hybrid.lowering import used_inputs
 from ..hybrid.programs import program
 from ..recordings.cut import Drive, padded, saturated
 from ._gap_rates import gap_rates
-from ._gaps_at_impacts import fitted_to_impacts, gap_points, GapPoints
+from ._gaps_at_impacts import (
+    fitted_to_impacts,
+    FittedValues,
+    gap_points,
+    GapPoints,
+)
 from .engine import (
     DriveState,
     Layout,
     Model,
+    moves_surface,
     parameter_places,
     state_size,
 )
@@ -69,27 +74,16 @@ def measured_gaps(
     moved = np.max(np.abs(by_value), axis=0, initial=0.0)
     parts = np.where(moved > 0, moved * np.where(moved > 0, tolerances, 0.0), 0.0)
     errors = np.sum(parts, axis=-1)
-    if _moves(layout.at(jnp.asarray(values)), states) and np.any(errors > 0):
+    if moves_surface(model.system, states[0]) and np.any(errors > 0):
         points = gap_points(recording.time, gaps, errors, recording.interval)
         at = _at_points(layout, points, (recording.time, states, *moving))
-        nominal = [p.nominal for p in parameters]
-        nominal = [v if n is None else n for v, n in zip(values, nominal)]
-        limits = [(p.lower, p.upper) for p in parameters]
-        bounds = np.array(limits).reshape(-1, 2).T
-        found = fitted_to_impacts(
-            points, at, values, tolerances, np.array(nominal), (bounds[0], bounds[1])
-        )
+        found = fitted_to_impacts(points, at, parameters, values)
         if found is not None:
             values = found.values
             gaps, by_state, by_value = gaps_and_slopes(values)
-            spread = np.einsum("kgp,pq,kgq->kg", by_value, found.covariance, by_value)
-            on = np.isfinite(found.left)
-            counts = np.bincount(points.gap[on], minlength=len(gaps))
-            left = np.bincount(points.gap[on], found.left[on] ** 2, len(gaps))
-            fitted = np.max(spread, axis=0) + left / np.maximum(counts, 1)
+            least = np.minimum(_errors(found, points, by_value), errors)
             # an error that other parameters cause remains as it was
             known = np.all((parts == 0) | found.fitted, axis=-1)
-            least = np.minimum(_SURE * np.sqrt(fitted), errors)
             errors = np.where(known, least, errors)
     slopes = np.max(np.abs(by_state), axis=0)
     rates: list = [None] * len(gaps)
@@ -100,11 +94,17 @@ def measured_gaps(
     return gaps, slopes, errors, rates, layout.at(jnp.asarray(values))
 
 
-def _moves(model: Model, states) -> bool:
-    """Return whether a gap of a model depends on time."""
-    state = jnp.zeros(states.shape[1])
-    closed = jax.make_jaxpr(model.system.gap)(jnp.zeros(()), state)
-    return used_inputs(closed)[0]
+def _errors(
+    found: FittedValues, points: GapPoints, by_value: Float[np.ndarray, "k g p"]
+) -> Float[np.ndarray, " g"]:
+    """Return the largest errors of the gaps that were fitted to impacts: those of the
+    parameters, and the gaps that remain at the impacts.
+    """
+    gaps, on = by_value.shape[1], np.isfinite(found.left)
+    spread = np.einsum("kgp,pq,kgq->kg", by_value, found.covariance, by_value)
+    counts = np.bincount(points.gap[on], minlength=gaps)
+    left = np.bincount(points.gap[on], found.left[on] ** 2, gaps)
+    return _SURE * np.sqrt(np.max(spread, axis=0) + left / np.maximum(counts, 1))
 
 
 def _at_points(layout: Layout, points: GapPoints, columns):

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...fitting import Input, Model, Parameter, Problem, Sensor, Setup, Turning
+from ...fitting.engine import moves_surface
 from ...hybrid import HybridSystem
 from ...recordings import Recording, References
 from ...recordings.cut import (
@@ -25,7 +26,6 @@ from ..terms import (
     fitted_faults,
     library,
     Location,
-    moves_surface,
     SensorTerm,
     system_with_terms,
     Term,

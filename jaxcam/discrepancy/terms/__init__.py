@@ -41,7 +41,6 @@ from ._location import (
     other_locations as other_locations,
 )
 from ._motion_scales import MotionScales as MotionScales
-from ._moving_surface import moves_surface as moves_surface
 from ._parametric_form import (
     MOST_PARTS as MOST_PARTS,
     Place as Place,

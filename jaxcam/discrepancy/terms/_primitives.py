@@ -13,6 +13,8 @@ from ._parametric_form import Place, Primitive, Special
 # Half-width over which edges are smoothed, as a fraction of the range: the distance
 # between two knots of the spline that represents a form
 _EDGE = 0.004
+# The same for the sine of a phase
+_EDGE_OF_PHASE = 0.01
 # An edge within this fraction of the range from its end may not be needed
 _AT_END = 0.1
 # Smallest exponent: with a smaller one, the form is a step
@@ -22,8 +24,8 @@ _FLATTEST = 0.2
 _LEAST = 1e-6
 
 
-def _step(at: Place, x):
-    return (1 + at.xp.tanh(x / _EDGE)) / 2
+def _step(at: Place, x, width=_EDGE):
+    return (1 + at.xp.tanh(x / width)) / 2
 
 
 def _power(at: Place, x, exponent):
@@ -219,7 +221,7 @@ HARMONICS = tuple(
 )
 HALF_TURN = Primitive(
     "half turn",
-    lambda at, p: p[0] * _step(at, at.xp.sin(at.x - p[1])),
+    lambda at, p: p[0] * _step(at, at.xp.sin(at.x - p[1]), _EDGE_OF_PHASE),
     (_EVERY,),
     (0.1,),
     apart=lambda p: 0.5 + 0.0 * p[1],
@@ -227,7 +229,9 @@ HALF_TURN = Primitive(
 )
 ARC = Primitive(
     "arc",
-    lambda at, p: p[0] * _step(at, at.xp.cos(at.x - p[1]) - at.xp.cos(p[2])),
+    lambda at, p: (
+        p[0] * _step(at, at.xp.cos(at.x - p[1]) - at.xp.cos(p[2]), _EDGE_OF_PHASE)
+    ),
     (_EVERY, _shares(0.2, 2.9, 19)),
     (0.1, 0.1),
     apart=lambda p: abs(p[2]) / np.pi,

@@ -53,6 +53,7 @@ from ._model import (
     Turning as Turning,
 )
 from ._modes import first_mode as first_mode, surfaces_in as surfaces_in
+from ._moving_surface import moves_surface as moves_surface
 from ._output import Output as Output
 from ._own_states import own_states as own_states
 from ._parameter import Parameter as Parameter

@@ -10,7 +10,6 @@ from jaxtyping import Float, Int
 from ._eliminate import eliminate_states, LEAST
 from ._extras import Extras
 from ._linearise import assemble, Blocks, Costs, Point
-from ._parameter import Parameter
 from ._problem import Problem
 from ._sharpness import shared_width
 
@@ -244,10 +243,7 @@ def off_nominal(problem: Problem, columns: Columns, point: Point):
 
 def nominal_of(problem: Problem, place: int | np.integer) -> float:
     """Return the nominal value of the parameter with this index."""
-    parameter: Parameter = problem.parameters[place]
-    if parameter.nominal is not None:
-        return parameter.nominal
-    return float(problem.start.values[0, place])
+    return problem.parameters[place].nominal_in(float(problem.start.values[0, place]))
 
 
 def prior_information(problem: Problem, columns: Columns, prior: bool):

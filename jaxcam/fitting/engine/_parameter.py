@@ -65,6 +65,10 @@ class Parameter:
         """Standard deviation of the prior."""
         return self.tolerance / math.sqrt(3.0)
 
+    def nominal_in(self, value: float) -> float:
+        """Return the nominal value in a model in which the parameter has a value."""
+        return value if self.nominal is None else self.nominal
+
     def size(self, value: float) -> float:
         """Return the size of a relevant change, positive."""
         if self.scale is not None:

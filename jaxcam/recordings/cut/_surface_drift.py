@@ -160,8 +160,8 @@ def _without_outliers(unknowns: _Unknowns, step: float) -> Int[np.ndarray, " m"]
     for _ in range(_PASSES):
         _, found = unknowns.solved(_LENGTHS[0], step, kept)
         left = np.abs(unknowns.off - unknowns.rows @ found)
-        spread = max(1.0, float(np.median(left[kept])) / 0.6745)
-        near = np.flatnonzero(left < _FAR * spread)
+        scatter = max(1.0, float(np.median(left[kept])) / 0.6745)
+        near = np.flatnonzero(left < _FAR * scatter)
         if np.array_equal(near, kept):
             break
         kept = near

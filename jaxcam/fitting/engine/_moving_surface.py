@@ -1,4 +1,4 @@
-"""Determine whether the drive of a system moves one of its surfaces."""
+"""Determine whether a surface of a system moves."""
 
 import jax
 import jax.numpy as jnp
