@@ -357,7 +357,9 @@ def test_a_fit_is_made_only_once():
 @pytest.mark.parametrize(
     ("score", "ties"), [(900.0, True), (1019.0, True), (1021.0, False)]
 )
-def test_a_function_that_single_pieces_do_not_exclude_ties(score, ties):
+def test_a_function_that_single_pieces_do_not_exclude_ties(
+    score, ties, unchecked_types
+):
     """The chosen one has a score of 1000 and a cost of twice the noise: up to twice
     `Policy.tie` above it, and if it is better.
     """
