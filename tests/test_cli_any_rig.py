@@ -17,6 +17,7 @@ from jaxcam.cli._axis import Axis
 from jaxcam.cli._output import Output
 from jaxcam.cli._source import Source
 from jaxcam.data import DEMO_RIG
+from jaxcam.fitting import Parameter
 from jaxcam.fitting._doubts import Doubt, Reason
 from jaxcam.fitting._fit_result import Estimate
 
@@ -132,10 +133,11 @@ def test_the_reason_of_a_failed_fit_is_left_to_standard_error(
 
 def _ended(gravity: float, ratio: float, reasons=()):
     """A fit with one parameter (9.81 +- 0.02) and one channel."""
-    parameter = SimpleNamespace(tolerance=0.02, nominal=9.81)
+    parameter = Parameter("gravity", lambda model: model, 0.02, nominal=9.81)
     problem = SimpleNamespace(
         names=("gravity",),
         parameters=(parameter,),
+        start=SimpleNamespace(values=np.array([[9.81], [9.81]])),
         parameter=lambda name: parameter,
         samples=9,
         records=("a", "b"),
