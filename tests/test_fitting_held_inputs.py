@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxcam import HybridSystem
-from jaxcam.fitting import fit, Input, Model, Parameter, Problem, Sensor
+from jaxcam.fitting import fit, Input, Model, Output, Parameter, Problem, Sensor
 from jaxcam.fitting.engine._fly import fly
 from jaxcam.recordings import Recording, segment
 
@@ -209,3 +209,37 @@ def test_steps_with_steep_forces_are_as_short_as_the_samples(cart, short):
     pieces = Problem.build(model, [part], []).pieces
     step = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
     assert (step <= _INTERVAL * (1 + 1e-9)) == short
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_readings_at_jumps_of_the_input_are_not_used(late):
+    """An accelerometer that is read before (1) or after (0) the jumps of a held force:
+    the readings at the jumps by 2 are not used, those at the jumps by 1e-3 (0.15 of the
+    noise) are, and the gain is within four standard errors."""
+    time, noise = _INTERVAL * np.arange(_COUNT), 0.02
+    large, small = np.arange(_COUNT) // 170 % 2, np.arange(_COUNT) // 7 % 2
+    force = 2.0 * large + 1e-3 * small
+    samples = [(0.0, 0.0)]
+    for level in force[:-1]:
+        samples.append(_moved(*samples[-1], level, 0.0, _INTERVAL))
+    rng = np.random.default_rng(5)
+    channels = {
+        "position_m": np.array(samples)[:, 0] + 1e-6 * rng.standard_normal(_COUNT),
+        "acceleration_m_s2": _GAIN * force[np.maximum(np.arange(_COUNT) - late, 0)]
+        + noise * rng.standard_normal(_COUNT),
+        "force_N": force,
+    }
+    sensors = {
+        "position_m": Sensor(0, noise=1e-6),
+        "acceleration_m_s2": Sensor(Output(1), noise=noise),
+    }
+    model = Model(Cart(gain=3.2), sensors, Input("force_N", _force))
+    gain = Parameter("gain", lambda m: m.system.gain, tolerance=0.5)
+    parts = [segment(Recording("run", time, channels), "position_m", None, noise=1e-6)]
+    problem = Problem.build(model, parts, [gain])
+
+    seen = dict(zip(sorted(sensors), np.moveaxis(problem.pieces.flown.known, -1, 0)))
+    unused = seen["position_m"] & ~seen["acceleration_m_s2"]
+    assert np.count_nonzero(unused) == np.count_nonzero(np.diff(large))
+    (found,) = fit(problem).estimates
+    assert abs(found.value - _GAIN) < 4 * found.stderr

@@ -57,6 +57,7 @@ from jaxtyping import ArrayLike, Float
 
 from ...recordings import RecordingError, Segments
 from ._extras import Extras
+from ._input_jumps import without_jumps
 from ._known_constants import known_constants
 from ._layout import Layout, strongly_typed
 from ._linearise import Point
@@ -216,6 +217,7 @@ class Problem:
             if followed_by_cubics(layout, pieces, point):
                 break
             steps = min(2 * steps, _MOST_STEPS)
+        pieces = without_jumps(layout, segments, pieces, point)
         extras = joint_sharpness(layout, pieces, point, guess)
         pieces = least_substeps(model, segments, pieces)
         pieces = enough_substeps(layout, pieces, extras, point, longest_flight(cuts))
