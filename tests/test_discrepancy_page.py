@@ -155,8 +155,8 @@ def test_the_page_is_complete(tmp_path, verdict, effects):
 @pytest.mark.usefixtures("unchecked_types")
 def test_the_page_says_why_nothing_is_predicted(tmp_path):
     found = _diagnosis("none", ())
-    outlook = Outlook(reason="Speeds are predicted only for a cam-follower.")
-    assert "only for a cam-follower" in diagnosis_page(found, (), (), outlook)
+    outlook = Outlook(reason="No speeds are predicted for an unknown effect.")
+    assert "for an unknown effect" in diagnosis_page(found, (), (), outlook)
 
 
 @pytest.mark.usefixtures("unchecked_types")

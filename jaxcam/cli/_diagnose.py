@@ -11,12 +11,6 @@ from ._grouped import grouped
 from ._options import Case, OwnSystem, Resume, RigFile
 
 
-_ONLY_CAMS = (
-    "Bifurcation speeds are predicted only for a cam-follower; for this rig, pass the "
-    "saved model to `jaxcam diagram --system`."
-)
-
-
 @grouped
 def diagnose(
     case: Case,
@@ -188,11 +182,10 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
         )
     elif predict:
         words = "predicting with and without the missing physics"
-        report(words, None)
-        predicted = discrepancy.predictions(
+        speeds = discrepancy.predictions(
             found, progress=lambda share: report(words, share)
         )
-        outlook = Outlook(predicted, reason="" if predicted else _ONLY_CAMS)
+        outlook = Outlook(speeds)
     if propose and any(one.element is not None for one in found.missing):
         report(
             "no recording is recommended, because a force with an internal state was "

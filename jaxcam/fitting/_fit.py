@@ -10,6 +10,7 @@ import numpy as np
 
 from ._descend import descend, Descent, Objective, TOLERANCE
 from ._doubts import poor_fit
+from ._equivalent_values import nearest_equivalent
 from ._fit_result import finish, Fit
 from ._own_value_starts import own_value_starts
 from .engine import (
@@ -117,6 +118,10 @@ def fit(
                 found = again
             if not _far(problem, found, weights):
                 break
+    if iterations > 0 and np.isfinite(found.cost):
+        nearer = nearest_equivalent(objective, found.point, found.cost)
+        if nearer is not None:
+            found = descend(objective, nearer, iterations, stop, None, tolerance)
     return finish(problem, columns, *found, prior=prior, weights=weights)
 
 
