@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from jaxcam import HybridSystem
-from jaxcam.fitting import fit, Input, Model, Output, Parameter, Problem, Sensor
+from jaxcam.fitting import (
+    fit,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Problem,
+    segment_by_model,
+    Sensor,
+)
 from jaxcam.fitting.engine._fly import fly
 from jaxcam.recordings import Recording, segment
 
@@ -243,3 +252,24 @@ def test_readings_at_jumps_of_the_input_are_not_used(late):
     assert np.count_nonzero(unused) == np.count_nonzero(np.diff(large))
     (found,) = fit(problem).estimates
     assert abs(found.value - _GAIN) < 4 * found.stderr
+
+
+class Pressed(Cart):
+    """A stop whose place is the input."""
+
+    def gap(self, t, state):
+        return self.force - state[0]
+
+
+def test_a_gap_that_depends_on_an_input_is_refused():
+    """The velocity of the stop is unknown; the message names the input."""
+    time = _INTERVAL * np.arange(_COUNT)
+    run = Recording("run", time, {"position_m": np.sin(time), "force_N": time})
+    model = Model(
+        Pressed(), {"position_m": Sensor(0, noise=1e-5)}, Input("force_N", _force)
+    )
+    part = segment(run, "position_m", None, noise=1e-5)
+    with pytest.raises(ValueError, match="A gap of Pressed depends on the input 'for"):
+        segment_by_model(model, [run])
+    with pytest.raises(ValueError, match="the acceleration of the surface"):
+        Problem.build(model, [part], [])

@@ -23,6 +23,7 @@ from .engine import (
     Model,
     Parameter,
     primary_channel,
+    refuse_moved_gaps,
     with_constants,
 )
 from .flown import located, shortest_period, with_coarse_note
@@ -73,6 +74,7 @@ def segment_by_model(
     Raises:
         RecordingError: A channel is missing, a gap depends on a state that no channel
             measures, or the samples are too far apart for the model to be followed.
+        ValueError: A gap depends on the measured input.
 
     Examples:
         >>> from jaxcam import fitting, recordings
@@ -84,6 +86,7 @@ def segment_by_model(
         >>> parts[0].impacts.count
         1
     """
+    refuse_moved_gaps(model)
     parameters = tuple(parameters)
     recordings = tuple(recordings)
     measured = tuple(measured_components(model).items())

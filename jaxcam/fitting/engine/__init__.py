@@ -59,7 +59,10 @@ from ._own_states import own_states as own_states
 from ._parameter import Parameter as Parameter
 from ._pieces import FLIGHT as FLIGHT, IMPACT as IMPACT
 from ._problem import Problem as Problem, Weights as Weights
-from ._problem_checks import parameter_places as parameter_places
+from ._problem_checks import (
+    parameter_places as parameter_places,
+    refuse_moved_gaps as refuse_moved_gaps,
+)
 from ._seen_directly import shows_directly as shows_directly
 from ._sharpness import (
     allowing as allowing,

@@ -68,6 +68,7 @@ from ._pieces import gather, Pieces, Span
 from ._problem_checks import (
     parameter_places,
     refuse_hysteresis,
+    refuse_moved_gaps,
     refuse_not_finite,
     refuse_repeated,
     refuse_switched_outputs,
@@ -176,6 +177,7 @@ class Problem:
         constants = known_constants(model, [part.recording for part in segments])
         parameters = (*parameters, *constants)
         refuse_hysteresis(model)
+        refuse_moved_gaps(model)
         refuse_switched_outputs(model)
         refuse_repeated(parameters)
         layout = Layout(model, parameter_places(model, parameters))

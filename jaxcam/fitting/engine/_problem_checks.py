@@ -1,16 +1,19 @@
 """Reject an invalid problem before fitting; each message is a sentence."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ...hybrid import SwitchedSystem
+from ...hybrid.lowering import used_inputs
 from ...hybrid.programs import program
 from ._layout import Layout
 from ._linearise import Point
-from ._model import augmented_field, Model
+from ._model import augmented_field, Input, Model
 from ._output import Output
 from ._pieces import Pieces
+from ._starts import state_size
 
 
 def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
@@ -73,6 +76,30 @@ def refuse_switched_outputs(model: Model) -> None:
                 f"{name} is an output, such as that of an accelerometer, of a system "
                 "with switching surfaces, where it jumps; leave this channel out."
             )
+
+
+def refuse_moved_gaps(model: Model) -> None:
+    """Raise `ValueError` if a gap depends on the measured input: the velocity of the
+    surface, which an impact needs, would be unknown.
+    """
+    source = model.drive
+    if not isinstance(source, Input):
+        return
+
+    def gaps_of(level, state):
+        system = eqx.tree_at(source.value, model.system, level)
+        return system.gap(jnp.zeros(()), state)
+
+    level, state = jnp.zeros(()), jnp.zeros(state_size(model))
+    if used_inputs(jax.make_jaxpr(gaps_of)(level, state))[0]:
+        raise ValueError(
+            f"A gap of {type(model.system).__name__} depends on the input "
+            f"{source.channel!r}, but the velocity of a surface cannot be computed "
+            "from a measured input. Use the position relative to this surface as a "
+            "coordinate, with the acceleration of the surface as the input; or state "
+            "the motion of the surface as a function of time, and fit its amplitude "
+            "and phase."
+        )
 
 
 def refuse_repeated(parameters) -> None:
