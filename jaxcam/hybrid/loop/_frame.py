@@ -1,32 +1,37 @@
-"""Directions in which a state is moved back onto the surface of a constraint."""
+"""Directions in which a state is moved back onto the surfaces of constraints."""
 
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from ..surface import gaps, normal_acceleration, normal_directions, normal_velocity
+from ..surface import gaps, normal_directions, normal_velocity
 
 
 class Frame(NamedTuple):
-    """Directions used to move a state back onto the surface; see `Functions.onto`."""
+    """For m constraints, the directions in which a state is moved, and the effects of
+    these displacements.
+
+    - `lift`, `push`: for each constraint, the direction E in which its gap changes by
+        one, and the direction D in which its normal velocity changes by one.
+    - `raised`, `hurried`: the changes of all gaps and of all normal velocities (rows)
+        by each E (columns).
+    - `pushed`: the changes of all normal velocities by each D.
+    """
 
     lift: tuple
     push: tuple
-    lift_velocity: tuple
-    damping: tuple
+    raised: tuple
+    hurried: tuple
+    pushed: tuple
 
 
 def frame_of(system, t, x):
-    """Return, for each constraint, the direction E in which the gap changes by one, the
-    direction D in which the normal velocity v changes by one, and the products v_x E
-    and C = a_x D, where a is the normal acceleration.
-    """
+    """Return the arrays of a `Frame`: two of shape `(m, n)`, and three of `(m, m)`."""
+    gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
     slope = jax.jacfwd(lambda y: normal_velocity(system, t, y))(x)
-    curve = jax.jacfwd(lambda y: normal_acceleration(system, t, y))(x)
-    push = normal_directions(system, t, x)
-    lift = lift_of(system, t, x)
-    return lift, push, jnp.sum(slope * lift, axis=1), jnp.sum(curve * push, axis=1)
+    lift, push = lift_of(system, t, x), normal_directions(system, t, x)
+    return lift, push, gradient @ lift.T, slope @ lift.T, slope @ push.T
 
 
 def lift_of(system, t, x):

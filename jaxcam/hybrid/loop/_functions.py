@@ -1,6 +1,7 @@
 """The functions of a system that one iteration of the loop evaluates, as scalars."""
 
 import contextlib
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +16,12 @@ from ..runge_kutta import rates_among
 from ._frame import Frame
 from ._gap_polynomial import Jet
 from ._programs import programs_of
-from ._select import everywhere, where_needed
+from ._select import everywhere, select, where_needed
+
+
+# Largest number of states (with a phase) of a body with one direction of motion, which
+# cannot rest on several constraints at once
+_ONE_MOTION = 3
 
 
 class Functions:
@@ -174,6 +180,14 @@ class Functions:
             self._call("together", t, _pack(x), _pack(closed), *self._side(mode))
         )
 
+    def pressed(self, t, x, touching, mode) -> tuple:
+        """Return the `pressed_accelerations` of bodies at rest on the `touching`
+        constraints.
+        """
+        return tuple(
+            self._call("pressed", t, _pack(x), _pack(touching), *self._side(mode))
+        )
+
     def sides(self, t, x) -> tuple:
         """Return for each surface whether a start is on its negative side."""
         return tuple(self._call("sides", t, _pack(x))) if self.k else ()
@@ -230,15 +244,9 @@ class Functions:
     def frame(self, t, x, mode) -> Frame:
         """Return the `Frame` at this state."""
         if not self.m:
-            return Frame((), (), (), ())
+            return Frame((), (), (), (), ())
         parts = self._call("frame", t, _pack(x), *self._side(mode))
-        lift, push, lift_velocity, damping = parts
-        return Frame(
-            tuple(map(tuple, lift)),
-            tuple(map(tuple, push)),
-            tuple(lift_velocity),
-            tuple(damping),
-        )
+        return Frame(*(tuple(map(tuple, part)) for part in parts))
 
     def lift(self, t, x, mode):
         """Return, for each gap, the displacement of the state that opens it by one."""
@@ -284,19 +292,47 @@ class Functions:
         return self._call("compliance", t, _pack(x), *self._side(mode))[()]
 
     def onto(self, frame: Frame, jets, x, mode):
-        """Take one Newton step of the state towards gap = normal velocity = 0."""
-        for k in range(self.m):
-            gap, velocity = jets[k].gap, jets[k].velocity
-            slip = velocity - gap * frame.lift_velocity[k]
-            x = tuple(
-                jnp.where(
-                    mode[k],
-                    x[i] - gap * frame.lift[k][i] - slip * frame.push[k][i],
-                    x[i],
-                )
-                for i in range(self.n)
+        """Take one Newton step of the state towards gaps and normal velocities of zero
+        on all constraints in contact.
+        """
+        rows, held = range(self.m), mode[: self.m]
+        lengths = tuple(jets[k].gap for k in rows)
+        pushes = tuple(
+            jets[k].velocity - lengths[k] * frame.hurried[k][k] for k in rows
+        )
+        if self.m > 1 and self.n > _ONE_MOTION:
+            number = sum(jnp.where(flag, 1.0, 0.0) for flag in held)
+            lengths, pushes = self.where(
+                number > 1, lambda: self._onto_all(frame, jets, held), (lengths, pushes)
             )
+        for k in rows:
+            lift, push = frame.lift[k], frame.push[k]
+            moved = [
+                x[i] - lengths[k] * lift[i] - pushes[k] * push[i] for i in range(self.n)
+            ]
+            x = select(held[k], moved, x)
         return x
+
+    def _onto_all(self, frame: Frame, jets, held) -> tuple[tuple, tuple]:
+        """Return the parts of the step along each direction of a `Frame`, for bodies in
+        contact with several constraints.
+        """
+        gaps = [jets[k].gap for k in range(self.m)]
+        lengths = self._weights(frame.raised, gaps, held)
+        speeds = [
+            jets[k].velocity - sum(a * b for a, b in zip(row, lengths, strict=True))
+            for k, row in enumerate(frame.hurried)
+        ]
+        return lengths, self._weights(frame.pushed, speeds, held)
+
+    def _weights(self, matrix, right, held) -> tuple:
+        """Return the solution of a linear system for the constraints in contact, zero
+        for the others.
+        """
+        square = np.empty((self.m, self.m), dtype=object)
+        for i, k in itertools.product(range(self.m), repeat=2):
+            square[i, k] = matrix[i][k]
+        return tuple(self._call("weights", square, _pack(right), _pack(held)))
 
 
 def _pack(scalars) -> np.ndarray:

@@ -21,6 +21,7 @@ from ._functions import Functions
 from ._gap_polynomial import Jet
 from ._jam import Jam, jam_of_step, jams_after
 from ._landing import land, Landing
+from ._leave_together import leave_together
 from ._loop_state import COMPLETED, LoopState
 from ._release import judge_contact, lets_go_before
 from ._row_kind import at_section, kind_of_switch, row_kind
@@ -107,7 +108,7 @@ def _iterate(
     )
     x = select(begins, chatter.state, select(sticking & ~lands, left, x))
     t = landing.t + delay
-    went = [released & (held.constraint == k) for k in range(functions.m)]
+    went = leave_together(functions, landing, held, released, delay)
     # a multiplier that only reaches zero has not released
     pressing = sticking & good & ~lands & ~released & ~carried.completing
     mode = tuple(

@@ -171,7 +171,7 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     if crossings:
         status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
     origin, extents = first_extents(lifts, jets, tinies, x)
-    contact, settled, touched = [], [], []
+    settled, touched = [], []
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
         gap, velocity = jet.gap, jet.velocity
         near = jnp.abs(gap) <= tiny
@@ -180,7 +180,6 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
         low = (jet.acceleration < 0) & (velocity * velocity <= hop)
         touching = near & ((jnp.abs(velocity) <= slow) | low)
         touched.append(touching)
-        contact.append(touching & _presses(jet, tiny) & (status == RUNNING))
         # off the surface, the start is unchanged; on it, rounding is removed
         behind = near & (gap < 0)
         shift = jax.lax.stop_gradient(jnp.where(behind, gap, 0.0))
@@ -193,6 +192,16 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
                 jet.jerk,
             )
         )
+    pulls = [jet.acceleration for jet in settled]
+    if functions.joins:
+        several = sum(jnp.where(flag, 1.0, 0.0) for flag in touched) > 1
+        pulls = functions.where(
+            several, lambda: functions.pressed(t0, x, touched, free), tuple(pulls)
+        )
+    contact = [
+        flag & _presses(jet._replace(acceleration=pull), tiny) & (status == RUNNING)
+        for flag, jet, pull, tiny in zip(touched, settled, pulls, tinies, strict=True)
+    ]
     if m and functions.slidable:
         # contact forces and their friction may also hold the motion on a surface
         found = first_sides(functions, t0, x, tuple(contact))

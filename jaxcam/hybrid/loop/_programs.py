@@ -33,9 +33,11 @@ from ..surface import (
     may_hit_together,
     normal_velocity,
     open_surfaces,
+    pressed_accelerations,
     resets,
     settled,
     slack_of_hold,
+    solve_masked,
     speed_rounding,
     surfaces,
     switched_rounding,
@@ -167,13 +169,21 @@ class Programs:
             self._add("compliance", least_compliance, time, state)
         if self.joins:
             self._add("together", impacts_together, time, state, flags)
+            self._add("pressed", pressed_accelerations, time, state, flags)
         if self.m > 1:
             self._add("joint_rest", joint_rest, time, state, flags)
+            square = jax.ShapeDtypeStruct((self.m, self.m), jnp.float64)
+            self._add("weights", _weights, square, speeds, flags, by_mode=False)
 
 
 def _free_field(system, t, x, contact):
     del contact
     return system.vector_field(t, x)
+
+
+def _weights(system, matrix, right, held):
+    del system
+    return solve_masked(matrix, right, held)
 
 
 def _unchanged(whole, series: bool, parameters, *arguments, memory=None):

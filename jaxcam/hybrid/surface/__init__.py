@@ -18,6 +18,7 @@ from ._contact_forces import (
     sticking_field as sticking_field,
 )
 from ._contact_friction import has_friction as has_friction
+from ._first_contacts import pressed_accelerations as pressed_accelerations
 from ._impact_law import (
     check_restitution as check_restitution,
     restitutions as restitutions,
@@ -36,6 +37,7 @@ from ._joint_rest import (
     SHORT_FLIGHT as SHORT_FLIGHT,
     SLOW_REBOUND as SLOW_REBOUND,
 )
+from ._masked import solve_masked as solve_masked
 from ._normal import (
     along_path as along_path,
     free_jet as free_jet,
@@ -61,14 +63,13 @@ from ._rounding import (
     speed_rounding as speed_rounding,
     start_room as start_room,
 )
+from ._slide_terms import InMode as InMode, Jumps as Jumps
 from ._sliding import (
     beyond_shares as beyond_shares,
     field_and_distances_in_mode as field_and_distances_in_mode,
     field_in_mode as field_in_mode,
     heights_rounded as heights_rounded,
     hold_of as hold_of,
-    InMode as InMode,
-    Jumps as Jumps,
     open_distances as open_distances,
     open_surfaces as open_surfaces,
     settled as settled,

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 
 from ._contact_friction import friction_on
 from ._normal import normal_directions, normal_velocity
-from ._sliding import InMode
+from ._slide_terms import InMode
 from ._switches import OnSides
 
 

@@ -13,7 +13,8 @@ from jaxtyping import Array, Bool, Float
 from .._system import HybridSystem
 from .._types import RealScalar, State
 from ._contact_friction import friction_of, has_friction
-from ._masked import solve_masked
+from ._least_multipliers import least_multipliers
+from ._masked import FEW, solve_masked
 from ._normal import gaps, normal_velocity, unit_directions
 
 
@@ -37,6 +38,31 @@ class ContactForces(NamedTuple):
     field: State
 
 
+def multipliers_at_ends(
+    system: HybridSystem,
+    t: RealScalar,
+    x: State,
+    contact: Bool[Array, " m"],
+    multipliers: Float[Array, " m"],
+) -> Float[Array, " m"]:
+    """Return multipliers that rise through zero when a contact ends, also if supports
+    are redundant: see `least_multipliers`.
+    """
+    if len(multipliers) < FEW:
+        return multipliers
+    terms = contact_terms(system, t, x)
+    return least_multipliers(
+        terms.gradient @ _pushes(system, t, x, terms).T, multipliers, contact
+    )
+
+
+def _pushes(system, t, x, terms: ContactTerms) -> Float[Array, "m n"]:
+    """Return the directions of the contact forces, with friction."""
+    if not has_friction(system):
+        return terms.directions
+    return terms.directions + friction_of(system, t, x)
+
+
 def contact_terms(system: HybridSystem, t: RealScalar, x: State) -> ContactTerms:
     """Return the terms that determine the contact forces at a state."""
     one = jnp.ones_like(t)
@@ -53,12 +79,11 @@ def contact_forces(
     terms: ContactTerms | None = None,
 ) -> ContactForces:
     """Return the multipliers and the field; `terms` are computed unless given."""
-    drift, gradient, pushes = contact_terms(system, t, x) if terms is None else terms
-    free = system.vector_field(t, x)
+    terms = contact_terms(system, t, x) if terms is None else terms
+    drift, gradient, _ = terms
+    free, pushes = system.vector_field(t, x), _pushes(system, t, x, terms)
     acceleration = drift + gradient @ free
-    if has_friction(system):
-        pushes = pushes + friction_of(system, t, x)
-    elif len(pushes) == 1:
+    if len(pushes) == 1 and not has_friction(system):
         found = jnp.where(contact, acceleration, jnp.zeros_like(acceleration))
         return ContactForces(found, free - found[0] * pushes[0])
     found = solve_masked(gradient @ pushes.T, acceleration, contact)
@@ -71,9 +96,10 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
 
     With one constraint without friction, q = a. The contact force is compressive while
     q < 0, and the contact ends when q rises through zero. For constraints that are not
-    in contact, q is zero.
+    in contact, q is zero. If a support is redundant, q is that of `least_multipliers`.
     """
-    return contact_forces(system, t, x, contact).multipliers
+    found = contact_forces(system, t, x, contact).multipliers
+    return multipliers_at_ends(system, t, x, contact, found)
 
 
 def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:
@@ -138,5 +164,6 @@ def field_and_distances(
 ) -> tuple[State, Distances]:
     """Return the field and the distances of a system without switching surfaces."""
     found, field = contact_forces(system, t, x, contact)
+    found = multipliers_at_ends(system, t, x, contact, found)
     none = jnp.zeros((0,))
     return field, Distances(gaps(system, t, x), found, none, none.astype(bool))

@@ -6,7 +6,10 @@ divided in proportion to the forces during slip, so both feet begin to slip at t
 instant.
 """
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
 
 from ._masked import solve_masked
 
@@ -14,6 +17,35 @@ from ._masked import solve_masked
 # two surfaces have the same slip velocity if the determinant of their gains is below
 # this fraction of the product of the diagonal
 _EQUAL = 1e-9
+
+
+class Tie(NamedTuple):
+    """Two surfaces, and whether the slip velocity of the second is that of the first
+    (`sign` 1), or its opposite (-1); of several such first surfaces, one counts.
+    """
+
+    first: int
+    second: int
+    equal: Bool[Array, ""]
+    sign: Float[Array, ""]
+
+
+def ties(gains, mask) -> list[Tie]:
+    """Return the ties between the masked surfaces.
+
+    **Arguments:** the changes of the slopes (rows) by the weights (columns).
+    """
+    found = []
+    for p in range(1, len(gains)):
+        follows = jnp.asarray(False)
+        for q in range(p):
+            product = gains[q, q] * gains[p, p]
+            rest = product - gains[q, p] * gains[p, q]
+            equal = mask[p] & mask[q] & (jnp.abs(rest) <= _EQUAL * jnp.abs(product))
+            now, follows = equal & ~follows, follows | equal
+            sign = jnp.where(gains[q, p] * gains[q, q] < 0, -1.0, 1.0)
+            found.append(Tie(q, p, now, sign))
+    return found
 
 
 def solve_equal_slips(gains, right, mask, shift):
@@ -33,18 +65,11 @@ def solve_equal_slips(gains, right, mask, shift):
         return solve_masked(gains, right, mask)
     rows = [[gains[i, k] for k in range(number)] for i in range(number)]
     values = [right[i] for i in range(number)]
-    for p in range(1, number):
-        follows = jnp.asarray(False)
-        for q in range(p):
-            product = gains[q, q] * gains[p, p]
-            rest = product - gains[q, p] * gains[p, q]
-            equal = mask[p] & mask[q] & (jnp.abs(rest) <= _EQUAL * jnp.abs(product))
-            now, follows = equal & ~follows, follows | equal
-            sign = jnp.where(gains[q, p] * gains[q, q] < 0, -1.0, 1.0)
-            tied = [jnp.asarray(float(k == p)) for k in range(number)]
-            tied[q] = -sign
-            pairs = zip(tied, rows[p], strict=True)
-            rows[p] = [jnp.where(now, a, b) for a, b in pairs]
-            values[p] = jnp.where(now, shift * (1 - sign) / 2, values[p])
+    for q, p, equal, sign in ties(gains, mask):
+        tied = [jnp.asarray(float(k == p)) for k in range(number)]
+        tied[q] = -sign
+        pairs = zip(tied, rows[p], strict=True)
+        rows[p] = [jnp.where(equal, a, b) for a, b in pairs]
+        values[p] = jnp.where(equal, shift * (1 - sign) / 2, values[p])
     matrix = jnp.stack([jnp.stack(row) for row in rows])
     return solve_masked(matrix, jnp.stack(values), mask)
