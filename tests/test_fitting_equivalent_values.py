@@ -1,5 +1,7 @@
 """Of several equivalent solutions, a fit returns the one near the nominal values."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -50,6 +52,33 @@ def problem():
     return Problem.build(
         Model(Shaken(), {"x_m": Sensor(0, noise=NOISE)}), parts, parameters
     )
+
+
+def test_bounds_are_respected(problem):
+    """A phase between 0 and 2 pi is not moved below 0, although this would be nearer to
+    the nominal value.
+    """
+    phase = dataclasses.replace(problem.parameters[1], lower=0.0, upper=2 * np.pi)
+    parameters = (problem.parameters[0], phase, problem.parameters[2])
+    bounded = dataclasses.replace(problem, parameters=parameters)
+    values = np.array(problem.start.values)
+    values[:, 0], values[:, 1] = 0.4, np.mod(TRUTH["phase"], 2 * np.pi)
+    point = problem.start._replace(values=jnp.asarray(values))
+    found = fit(bounded, start=point)
+    assert found.converged
+    phases = [one.value for one in found.estimates if one.name == "phase"]
+    np.testing.assert_allclose(phases, np.mod(TRUTH["phase"], 2 * np.pi), atol=1e-2)
+
+
+def test_a_stopped_fit_is_not_continued(problem):
+    """`stop` is called once, and the values are not moved."""
+    values = np.array(problem.start.values)
+    values[:, 1] = np.array(TRUTH["phase"]) + 2 * np.pi + 0.05
+    point, calls = problem.start._replace(values=jnp.asarray(values)), []
+    found = fit(problem, start=point, stop=lambda costs: not calls.append(costs))
+    assert len(calls) == 1
+    assert not found.converged
+    assert all(one.value > 3 for one in found.estimates if one.name == "phase")
 
 
 @pytest.mark.parametrize("prior", [False, True])

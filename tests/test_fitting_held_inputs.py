@@ -18,7 +18,7 @@ from jaxcam.fitting import (
     Sensor,
 )
 from jaxcam.fitting.engine._fly import fly
-from jaxcam.recordings import Recording, segment
+from jaxcam.recordings import Recording, RecordingError, segment
 
 
 _INTERVAL, _NOISE, _GAIN = 1e-3, 1e-7, 3.0
@@ -252,6 +252,32 @@ def test_readings_at_jumps_of_the_input_are_not_used(late):
     assert np.count_nonzero(unused) == np.count_nonzero(np.diff(large))
     (found,) = fit(problem).estimates
     assert abs(found.value - _GAIN) < 4 * found.stderr
+
+
+@pytest.mark.parametrize("bandwidth", [np.inf, 300.0])
+def test_an_input_that_always_jumps_leaves_no_readings(bandwidth):
+    """With a random force, no reading of an accelerometer without a filter is known to
+    follow or precede the jump; one with a filter does not jump.
+    """
+    rng, time = np.random.default_rng(2), _INTERVAL * np.arange(_COUNT)
+    force = rng.standard_normal(_COUNT)
+    channels = {
+        "position_m": np.sin(time),
+        "acceleration_m_s2": force,
+        "force_N": force,
+    }
+    sensors = {
+        "position_m": Sensor(0, noise=1e-6),
+        "acceleration_m_s2": Sensor(Output(1), noise=0.02, bandwidth_hz=bandwidth),
+    }
+    model = Model(Cart(), sensors, Input("force_N", _force))
+    parts = [segment(Recording("run", time, channels), "position_m", None, noise=1e-6)]
+    if np.isfinite(bandwidth):
+        known = Problem.build(model, parts, []).pieces.flown.known
+        assert np.count_nonzero(known) > 2 * (_COUNT - 10)
+    else:
+        with pytest.raises(RecordingError, match="jumps at nearly every sample"):
+            Problem.build(model, parts, [])
 
 
 class Pressed(Cart):

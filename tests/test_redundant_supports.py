@@ -11,6 +11,7 @@ from jaxcam.hybrid import Settings
 from jaxcam.hybrid.flow_jacobian import flow_jacobian
 from jaxcam.hybrid.surface import field_in_force, solve_masked
 from jaxcam.hybrid.surface._contact_forces import contact_forces
+from jaxcam.hybrid.surface._masked import null_vector
 
 
 INERTIA = 0.3
@@ -95,6 +96,26 @@ def test_solutions_in_the_range_of_the_matrix(seed):
     assert np.all(found[~mask] == 0)
     within = np.linalg.lstsq(part, found[mask], rcond=None)[0]
     np.testing.assert_allclose(part @ within, found[mask], atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_solutions_with_different_friction(seed):
+    """Of matrices of rank 3 with 4 rows that are not symmetric, as with friction, of
+    which three rows have rank 2, in any order: the system is solved, and the null
+    vector is one, to 1e-10.
+    """
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(4)
+    gradients = np.array([[0, 1, -1.0], [0, 1, 0.3], [0, 1, 1], [1, 0, 0.4]])[order]
+    pushes = (gradients + 0.4 * rng.standard_normal((4, 3))) / 2
+    matrix, mask = gradients @ pushes.T, np.ones(4, dtype=bool)
+    right = matrix @ rng.standard_normal(4)
+    given = jnp.array(matrix), jnp.array(right), jnp.array(mask)
+    found = np.asarray(solve_masked(*given))
+    np.testing.assert_allclose(matrix @ found, right, atol=1e-10)
+    null = np.asarray(null_vector(given[0], given[2]))
+    assert np.max(np.abs(null)) >= 1
+    np.testing.assert_allclose(matrix @ null, 0.0, atol=1e-10)
 
 
 def test_a_beam_falls_to_rest_on_three_feet():

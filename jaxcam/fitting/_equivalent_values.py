@@ -22,7 +22,8 @@ def nearest_equivalent(objective: Objective, point: Point, cost: float) -> Point
 
     The phase of an oscillation is the same after a full turn, and its amplitude may
     change its sign if the phase is shifted by half a turn. Both are tried with the
-    parameters in radians; a change counts only if the cost does not increase.
+    parameters in radians; a change counts only if all values are within their bounds
+    and the cost does not increase.
 
     Args:
         objective: The cost.
@@ -30,12 +31,25 @@ def nearest_equivalent(objective: Objective, point: Point, cost: float) -> Point
         cost: Its cost, finite.
     """
     problem, found = objective.problem, None
+    low, high = np.array([(one.lower, one.upper) for one in problem.parameters]).T
     values = np.array(point.values)
     free = list(dict.fromkeys(objective.columns.parameter.tolist()))
     angles = [p for p in free if problem.parameters[p].unit == _ANGLE]
 
+    def turned(values, angle: int) -> Float[np.ndarray, "r q"]:
+        """Return the values with an angle within half a turn of its nominal value, in
+        each recording in which the bounds permit it.
+        """
+        trial, turn, own = values.copy(), 2 * math.pi, values[:, angle]
+        near = own - turn * np.round((own - nominal_of(problem, angle)) / turn)
+        within = (low[angle] <= near) & (near <= high[angle])
+        trial[:, angle] = np.where(within, near, own)
+        return trial
+
     def accepted(trial) -> bool:
         nonlocal found, values, cost
+        if np.any((trial < low) | (trial > high)):
+            return False
         at = point._replace(values=jnp.asarray(trial))
         after = objective.at(at).cost
         if not after <= cost + _ROUNDING * (1 + abs(cost)):
@@ -44,7 +58,7 @@ def nearest_equivalent(objective: Objective, point: Point, cost: float) -> Point
         return True
 
     for angle in angles:
-        trial = _turned(values, angle, nominal_of(problem, angle))
+        trial = turned(values, angle)
         if not np.array_equal(trial, values):
             accepted(trial)
     for p in free:
@@ -57,15 +71,6 @@ def nearest_equivalent(objective: Objective, point: Point, cost: float) -> Point
             trial = values.copy()
             trial[wrong, p] *= -1
             trial[wrong, angle] += math.pi
-            if accepted(_turned(trial, angle, nominal_of(problem, angle))):
+            if accepted(turned(trial, angle)):
                 break
     return found
-
-
-def _turned(
-    values: Float[np.ndarray, "r q"], angle: int, nominal: float
-) -> Float[np.ndarray, "r q"]:
-    """Return the values with an angle within half a turn of its nominal value."""
-    turned, turn = values.copy(), 2 * math.pi
-    turned[:, angle] -= turn * np.round((values[:, angle] - nominal) / turn)
-    return turned

@@ -118,10 +118,12 @@ def fit(
                 found = again
             if not _far(problem, found, weights):
                 break
-    if iterations > 0 and np.isfinite(found.cost):
+    if found.optimal:
         nearer = nearest_equivalent(objective, found.point, found.cost)
         if nearer is not None:
-            found = descend(objective, nearer, iterations, stop, None, tolerance)
+            again = descend(objective, nearer, iterations, tolerance=tolerance)
+            if again.optimal and not again.cost > found.cost + tolerance:
+                found = again._replace(count=found.count + again.count)
     return finish(problem, columns, *found, prior=prior, weights=weights)
 
 

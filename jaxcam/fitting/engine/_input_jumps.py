@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid.programs import program
-from ...recordings import Segments
+from ...recordings import RecordingError, Segments
 from ._driven_steps import input_at
 from ._layout import Layout
 from ._linearise import Point
@@ -18,6 +18,8 @@ from ._output import Output
 from ._pieces import Pieces
 
 
+# Smallest fraction of the samples of a channel that must remain
+_LEAST = 0.5
 # Part of a sampling interval: shortly before and after a sample
 _BESIDE = 0.01
 
@@ -30,7 +32,8 @@ def without_jumps(
     An output, such as the reading of an accelerometer, jumps with the input. A sample
     at the time of a jump may have been taken before or after it, and a prediction, in
     which the input is linear within each step, contains a part of the jump. The sample
-    is not used if this makes a difference that exceeds the noise.
+    is not used if this makes a difference that exceeds the noise, for the initial
+    values of the parameters.
 
     Args:
         layout: The model, with an input or without one.
@@ -40,9 +43,15 @@ def without_jumps(
 
     Returns:
         The pieces; the samples that are not used are not `known`.
+
+    Raises:
+        RecordingError: Nearly all samples of a channel would not be used.
     """
     source, sensors = layout.model.drive, layout.model.sensors.values()
-    outputs = np.array([isinstance(one.observe, Output) for one in sensors])
+    # the reading of a filtered sensor does not jump
+    outputs = np.array(
+        [isinstance(one.observe, Output) and not one.filtered for one in sensors]
+    )
     if not isinstance(source, Input) or not np.any(outputs):
         return pieces
     flown = pieces.flown
@@ -65,6 +74,19 @@ def without_jumps(
     effect = np.abs(_effects(layout, flown.start, pieces.drive_at, point))
     jumps = error[..., None] * effect[:, :, None, None] > 1.0
     known = np.asarray(flown.known) & ~(jumps & outputs)
+    before, after = (
+        np.sum(part, axis=(0, 1, 2, 3)) for part in (np.asarray(flown.known), known)
+    )
+    for name, count, left in zip(layout.model.sensors, before, after, strict=True):
+        if left < _LEAST * count:
+            raise RecordingError(
+                f"The input `{source.channel}` jumps at nearly every sample, by more "
+                f"than the noise of `{name}`, and it is not known whether a reading of "
+                "this channel was taken before or after the jump: "
+                f"{count - left} of {count} readings cannot be used. Leave this "
+                "channel out, state its `bandwidth_hz`, or write `interpolation = "
+                '"linear"` if the input is continuous.'
+            )
     return dataclasses.replace(pieces, flown=dataclasses.replace(flown, known=known))
 
 

@@ -37,7 +37,7 @@ from ._joint_rest import (
     SHORT_FLIGHT as SHORT_FLIGHT,
     SLOW_REBOUND as SLOW_REBOUND,
 )
-from ._masked import solve_masked as solve_masked
+from ._masked import FEW as FEW, solve_masked as solve_masked
 from ._normal import (
     along_path as along_path,
     free_jet as free_jet,

@@ -44,13 +44,14 @@ def multipliers_at_ends(
     x: State,
     contact: Bool[Array, " m"],
     multipliers: Float[Array, " m"],
+    terms: ContactTerms | None = None,
 ) -> Float[Array, " m"]:
     """Return multipliers that rise through zero when a contact ends, also if supports
     are redundant: see `least_multipliers`.
     """
     if len(multipliers) < FEW:
         return multipliers
-    terms = contact_terms(system, t, x)
+    terms = contact_terms(system, t, x) if terms is None else terms
     return least_multipliers(
         terms.gradient @ _pushes(system, t, x, terms).T, multipliers, contact
     )
@@ -96,7 +97,8 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
 
     With one constraint without friction, q = a. The contact force is compressive while
     q < 0, and the contact ends when q rises through zero. For constraints that are not
-    in contact, q is zero. If a support is redundant, q is that of `least_multipliers`.
+    in contact, q is zero. If one support is redundant, q is that of
+    `least_multipliers`.
     """
     found = contact_forces(system, t, x, contact).multipliers
     return multipliers_at_ends(system, t, x, contact, found)
@@ -163,7 +165,8 @@ def field_and_distances(
     system, t, x, contact: Bool[Array, " m"]
 ) -> tuple[State, Distances]:
     """Return the field and the distances of a system without switching surfaces."""
-    found, field = contact_forces(system, t, x, contact)
-    found = multipliers_at_ends(system, t, x, contact, found)
+    terms = contact_terms(system, t, x)
+    found, field = contact_forces(system, t, x, contact, terms)
+    found = multipliers_at_ends(system, t, x, contact, found, terms)
     none = jnp.zeros((0,))
     return field, Distances(gaps(system, t, x), found, none, none.astype(bool))

@@ -2,8 +2,9 @@
 
 The feet of a rigid body that rests flat on a floor slip at the same velocity. Their
 friction forces are then statically indeterminate: only the sum is determined. It is
-divided in proportion to the forces during slip, so both feet begin to slip at the same
-instant.
+divided in proportion to the forces during slip, so all feet begin to slip at the same
+instant. The same applies to surfaces with proportional slip velocities, such as those
+at the two ends of a ladder.
 """
 
 from typing import NamedTuple
@@ -20,8 +21,9 @@ _EQUAL = 1e-9
 
 
 class Tie(NamedTuple):
-    """Two surfaces, and whether the slip velocity of the second is that of the first
-    (`sign` 1), or its opposite (-1); of several such first surfaces, one counts.
+    """Two surfaces, and whether the slip velocity of the second is proportional to that
+    of the first, with a positive or negative factor (`sign`); a surface is tied only to
+    the first such surface.
     """
 
     first: int

@@ -8,7 +8,7 @@ which all supports push and this one carries a load.
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ._masked import FEW, null_vector
+from ._masked import null_vector
 
 
 # An element of a null vector below this fraction of the largest is a rounding error
@@ -20,17 +20,16 @@ def least_multipliers(
     multipliers: Float[Array, " m"],
     contact: Bool[Array, " m"],
 ) -> Float[Array, " m"]:
-    """Return the smallest multiplier of each contact among all solutions in which all
-    supports push; it rises through zero when the contact ends.
+    """Return the multiplier of the largest load of each contact among all solutions in
+    which all supports push; it rises through zero when the contact ends.
 
-    The multipliers are returned unchanged unless exactly one support is redundant.
+    Each is that of a different solution, so together they are not in equilibrium. The
+    multipliers are returned unchanged unless exactly one support is redundant.
 
     **Arguments:** the changes of the normal accelerations (rows) by the multipliers
     (columns); the multipliers of the contact forces, negative if compressive; and which
     constraints are in contact.
     """
-    if len(multipliers) < FEW:
-        return multipliers
     null = null_vector(matrix, contact)
     size = jnp.max(jnp.abs(null))
     up, down = null > _ZERO * size, null < -_ZERO * size

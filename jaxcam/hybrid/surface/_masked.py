@@ -16,8 +16,8 @@ def solve_masked(matrix, right, mask):
 
     If a body has more supports than its equilibrium determines (it is statically
     indeterminate), the matrix is singular. Of all solutions, the one in the range of
-    the matrix is returned: forces are distributed as if every support was a spring with
-    the same natural frequency.
+    the matrix is returned: forces are distributed as if every support were a spring
+    with the same natural frequency.
 
     The diagonal of the matrix must not be zero where the mask holds, because the
     elimination has no pivoting. The elimination is unrolled, because the matrix is
@@ -76,11 +76,16 @@ def _eliminated(matrix, right, mask) -> _Eliminated:
             values[p] = jnp.where(small, zero, values[p])
         for i in range(p + 1, number):
             factor = rows[i][p] / rows[p][p]
+            if p and number >= FEW:
+                # a redundant row eliminates nothing
+                factor = jnp.where(redundant[-1][1], zero, factor)
             rows[i] = [a - factor * b for a, b in zip(rows[i], rows[p], strict=True)]
             values[i] = values[i] - factor * values[p]
     free = []
     for p, small, left in redundant:
-        unit = [jnp.where(small & (k == p), one, zero) for k in range(number)]
+        unit = [jnp.where(small, one, zero) if k == p else zero for k in range(number)]
+        for k in range(p + 1, number):
+            unit[k] = jnp.where(small, -rows[k][p], zero)
         free.append((small, left, _substituted(rows, unit)))
     return _Eliminated(rows, values, free)
 

@@ -154,8 +154,7 @@ def heights_rounded(mode: OnSides, t, x, reach: State) -> Float[Array, "2 k"]:
 def field_and_distances_in_mode(mode: InMode, t, x) -> tuple[State, Distances]:
     """Return the field and the `Distances` in this mode."""
     multipliers, field = forces_in_mode(mode, t, x)
-    if len(multipliers):
-        multipliers = multipliers_at_ends(mode, t, x, mode.contact, multipliers)
+    multipliers = multipliers_at_ends(mode, t, x, mode.contact, multipliers)
     still = [jnp.asarray(False) for _ in mode.jumps]
     if mode.slidable and mode.contact.shape[0]:
         held = slide_terms(mode, t, x).still
