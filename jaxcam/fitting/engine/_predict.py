@@ -12,6 +12,7 @@ from ._constant import constant
 from ._fly import runge_kutta
 from ._model import augmented_field, DriveState, filtered_channels, Model
 from ._modes import on_side_of
+from ._output import Output
 from ._readings import Nodes
 
 
@@ -179,7 +180,8 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
     """Return the joint between two flights, at the time at which they have the same
     gap.
 
-    No event search is needed: both flights and the impact between them are known.
+    No event search is needed: both flights and the impact between them are known. The
+    filter of an accelerometer continues with any state, because the impact shakes it.
     """
     size = end.shape[0] - len(filtered_channels(model))
     system = model.driven(t, drive)
@@ -224,7 +226,16 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
     before, after = states + last * fields
     shift = shift + last
     landed = after_impact(system, t + shift, before[:size])
-    landed = jnp.concatenate([landed, before[size:]])
+    # the shock of an impact on an accelerometer is not known
+    shaken = jnp.array(
+        [
+            isinstance(model.sensors[name].observe, Output)
+            for name in filtered_channels(model)
+        ],
+        dtype=bool,
+    )
+    filtered = jnp.where(shaken, after[size:], before[size:])
+    landed = jnp.concatenate([landed, filtered])
     return Joint(after - landed, smallest_gap(system, t + shift, before[:size]))
 
 

@@ -15,6 +15,7 @@ from ._fly import end_of_flight, fly_without_derivatives
 from ._layout import Layout
 from ._linearise import Point
 from ._model import DriveState, Input, Model
+from ._output import Output
 from ._pieces import Pieces
 
 
@@ -34,6 +35,9 @@ _LONG = 16
 # Largest step, relative to the time constant of a sensor filter; the error of the cubic
 # Hermite interpolation is then 1e-4 of a jump
 _FILTER_STEP = 0.4
+# Largest substep, relative to this time constant, for an accelerometer: the error of
+# the filter state is then 4e-6 of a shock
+_SHAKEN_SUBSTEP = 0.15
 # A larger number of steps is rounded up to a multiple of this, so that similar problems
 # share a program
 _MULTIPLE = 20
@@ -147,15 +151,18 @@ def followed_by_cubics(layout: Layout, pieces: Pieces, point: Point) -> bool:
 
 def least_substeps(model: Model, segments, pieces: Pieces) -> Pieces:
     """Return the pieces with substeps as short as the samples, if a measured input
-    drives a switched system: two crossings in one substep would be missed.
+    drives a switched system: two crossings in one substep would be missed. If there is
+    an accelerometer, its filter must be followed after the shock of an impact.
     """
-    if not isinstance(model.drive, Input):
-        return pieces
-    if not isinstance(model.system, SwitchedSystem):
-        return pieces
-    finest = steps_of_samples(segments, pieces, pieces.steps)
-    least = min(math.ceil(finest / pieces.steps), _MOST_SUBSTEPS)
-    return _divided(pieces, least)
+    least = 1.0
+    if isinstance(model.drive, Input) and isinstance(model.system, SwitchedSystem):
+        least = steps_of_samples(segments, pieces, pieces.steps) / pieces.steps
+    longest = float(np.max(np.where(pieces.exists, pieces.flown.step, 0.0)))
+    for one in model.sensors.values():
+        if one.filtered and isinstance(one.observe, Output):
+            settles = 1 / (2 * np.pi * one.bandwidth_hz)
+            least = max(least, longest / (_SHAKEN_SUBSTEP * settles))
+    return _divided(pieces, min(math.ceil(least), _MOST_SUBSTEPS))
 
 
 def _divided(pieces: Pieces, substeps: int) -> Pieces:
