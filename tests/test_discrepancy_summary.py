@@ -60,3 +60,12 @@ def test_values_that_differ_between_recordings_are_all_reported():
     }
     pulls = _pulls(question, fitted, fitted)  # pyright: ignore
     assert pulls["phase@b"] == pytest.approx((1.0, 1.0))
+
+
+@pytest.mark.parametrize(("scatter", "error"), [(0.05, 0.05), (0.4, 0.3 / 3**0.5)])
+def test_the_scatter_of_bootstrap_samples_does_not_exceed_the_prior(scatter, error):
+    """A tolerance of 0.3 has the standard deviation 0.3 / sqrt(3)."""
+    question = SimpleNamespace(rig=("tilt",), shown={}, fitted_speed=None)
+    fitted = Fitted(Estimate("tilt", 0.5, 0.01))
+    found = _rig_values(question, fitted, {"tilt": scatter})  # pyright: ignore
+    assert found["tilt"].stderr == pytest.approx(error)

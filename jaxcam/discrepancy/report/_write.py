@@ -268,7 +268,9 @@ def _rig_values(
     for one in fitted.estimates:
         if one.name not in question.rig:
             continue
-        stderr = max(one.stderr, deviation.get(one.name, 0.0))
+        # some bootstrap samples contain no information on a parameter
+        most = fitted.problem.parameter(one.name).prior_stderr
+        stderr = max(one.stderr, min(deviation.get(one.name, 0.0), most))
         if question.fitted_speed is not None:
             more = question.fitted_speed.errors.get(one.label, 0.0)
             stderr = math.hypot(stderr, more)
