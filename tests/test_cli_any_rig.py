@@ -17,9 +17,10 @@ from jaxcam.cli._axis import Axis
 from jaxcam.cli._output import Output
 from jaxcam.cli._source import Source
 from jaxcam.data import DEMO_RIG
-from jaxcam.fitting import Parameter
+from jaxcam.fitting import Input, Model, Parameter, Turning
 from jaxcam.fitting._doubts import Doubt, Reason
 from jaxcam.fitting._fit_result import Estimate
+from jaxcam.models import preset
 
 
 ROOT = Path(__file__).parents[1]
@@ -181,6 +182,27 @@ def test_a_hopeless_fit_doubts_the_units(gravity, ratio, reasons, said, monkeypa
     found, quality = _ended(gravity, ratio, reasons)
     monkeypatch.setattr(_fit_result.Result, "quality", [quality])
     assert ("deg or rad, ms or s" in found.remainder) == said
+
+
+@pytest.mark.parametrize(
+    ("drive", "fitted", "said"),
+    [
+        (Input("force_N", lambda s: s.force), False, "unit of the input force_N"),
+        (Turning(lambda s: s.speed, lambda s: s.phase), False, "phase a tolerance"),
+        (Turning(lambda s: s.speed, lambda s: s.phase), True, ""),
+        (None, False, ""),
+    ],
+)
+def test_a_hopeless_fit_doubts_the_drive(drive, fitted, said, monkeypatch):
+    found, quality = _ended(9.81, 1001.0)
+    found.problem.model = Model(preset("calibrated"), {}, drive)
+    if fitted:
+        phase = Parameter("phase", lambda model: model.system.phase)
+        found.problem.parameters = (phase,)
+    monkeypatch.setattr(_fit_result.Result, "quality", [quality])
+    after = found.remainder.partition("mm or m).")[2]
+    assert said in after
+    assert bool(said) == bool(after)
 
 
 @pytest.mark.parametrize(("ratio", "said"), [(0.49, True), (0.51, False)])

@@ -85,7 +85,27 @@ class Result:
                 " Check the units, the signs and the order of the columns first (deg "
                 "or rad, ms or s, mm or m)."
             )
+            sentence += self._of_drive()
         return sentence
+
+    def _of_drive(self) -> str:
+        """Say what may be wrong with the drive or the input of a hopeless fit."""
+        model, parameters = self.problem.model, self.problem.parameters
+        drive = model.drive
+        if isinstance(drive, fitting.Input):
+            return (
+                f" Check the sign and the unit of the input {drive.channel} in each "
+                "recording too."
+            )
+        if drive is None:
+            return ""
+        phase = drive.phase(model.system)
+        if any(one.where(model) is phase for one in parameters):
+            return ""
+        return (
+            " The phase of the drive is not fitted: unless the zero of its encoder is "
+            "known, give the phase a tolerance in the rig file."
+        )
 
     def _quieter(self) -> str:
         """Name the channels whose stated noise is too large."""
