@@ -10,7 +10,8 @@ from swing_rig import PARAMETERS, Swing
 
 from jaxcam.discrepancy import diagnose, Policy, strength, Term, Verdict
 from jaxcam.discrepancy.evidence import shares, VisitedStates
-from jaxcam.discrepancy.report import Reason
+from jaxcam.discrepancy.evidence._held_out import HeldOut
+from jaxcam.discrepancy.report import _write, Reason
 from jaxcam.discrepancy.report._units_in_doubt import units_in_doubt
 from jaxcam.discrepancy.search import system_question
 from jaxcam.fitting import Parameter, Sensor
@@ -278,3 +279,27 @@ def test_positions_that_contradict_the_stops_are_a_caveat():
     (caveat,) = units_in_doubt(question, choice, Policy())  # pyright: ignore
     assert caveat.reason is Reason.UNITS
     assert caveat.sentence == "No impact was found."
+
+
+@pytest.mark.usefixtures("unchecked_types")
+@pytest.mark.parametrize(
+    ("left", "held", "reasons"),
+    [
+        (1.0, 2.7, [Reason.POOR_PREDICTION]),
+        (1.5, 2.7, [Reason.POOR_FIT]),
+        (1.0, 1.0, []),
+    ],
+)
+def test_functions_that_explain_but_do_not_predict(left, held, reasons, monkeypatch):
+    """The model is not called incomplete if all data leave only noise."""
+    monkeypatch.setattr(_write, "rms_of", lambda fit: left)
+    choice = SimpleNamespace(
+        unnamed=SimpleNamespace(rivals=()),
+        named=SimpleNamespace(direction=None),
+        held=HeldOut(10.0, held, {}, ([], [])),
+        differing=None,
+        tied=None,
+    )
+    missing = SimpleNamespace(fit=None, functions=(), names=(), decoys=())
+    found = list(_write._doubts_of(choice, missing, Policy()))  # pyright: ignore
+    assert [caveat.reason for caveat in found] == reasons

@@ -198,6 +198,20 @@ def functions_fall_short(left: float) -> Caveat:
     )
 
 
+def functions_not_predictive(held: HeldOut) -> Caveat:
+    """Return the caveat that part of the data does not determine unnamed functions that
+    explain all data.
+    """
+    return Caveat(
+        Reason.POOR_PREDICTION,
+        "Fitted to all data, the model leaves only noise, but part of the data does "
+        "not determine its functions well enough to predict the rest: on held-out "
+        f"data, the residual is {ratio(held.after)} times the noise, compared with "
+        f"{ratio(held.before)} times for the textbook model. Record more motions of "
+        "this kind.",
+    )
+
+
 def functions_tie(name: str, rival: Rival) -> Caveat:
     """Return the caveat that another function or form explains about as much."""
     return Caveat(

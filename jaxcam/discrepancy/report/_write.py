@@ -26,13 +26,13 @@ from ._alternatives import (
     rival_name,
 )
 from ._caveats import (
-    above_noise,
     by_chance,
     Caveat,
     caveats_of,
     decoy_explains,
     differs,
     functions_fall_short,
+    functions_not_predictive,
     functions_tie,
     may_differ,
     model_errors,
@@ -246,7 +246,7 @@ def _doubts_of(choice: Choice, missing: Missing, policy: Policy) -> Iterator[Cav
     if rms_of(left) > policy.as_noise:
         yield functions_fall_short(rms_of(left))
     elif held.after > policy.as_noise:
-        yield above_noise(held, True)
+        yield functions_not_predictive(held)
 
 
 def _verdict(choice: Choice, named: bool, small: float) -> tuple[Verdict, list[Caveat]]:
