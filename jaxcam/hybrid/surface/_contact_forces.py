@@ -97,7 +97,7 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
 
     With one constraint without friction, q = a. The contact force is compressive while
     q < 0, and the contact ends when q rises through zero. For constraints that are not
-    in contact, q is zero. If one support is redundant, q is that of
+    in contact, q is zero. If a support is redundant, q is that of
     `least_multipliers`.
     """
     found = contact_forces(system, t, x, contact).multipliers

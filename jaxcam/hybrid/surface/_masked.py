@@ -29,14 +29,14 @@ def solve_masked(matrix, right, mask):
 
 
 def null_vector(matrix, mask):
-    """Return a vector that the masked part of a matrix maps to zero; a vector of zeros
-    if there is none, or more than one.
+    """Return a vector that the masked part of a matrix maps to zero, and the number of
+    independent vectors of this kind; if there is none, return zeros.
     """
     made = _eliminated(matrix, jnp.zeros(matrix.shape[0]), mask)
     number, found = jnp.zeros(()), jnp.zeros(matrix.shape[0])
     for small, _, right in made.free:
         found, number = found + right, number + jnp.where(small, 1.0, 0.0)
-    return jnp.where(number == 1, found, jnp.zeros_like(found))
+    return found, number
 
 
 class _Eliminated(NamedTuple):
