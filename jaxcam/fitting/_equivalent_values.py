@@ -31,7 +31,8 @@ def nearest_equivalent(objective: Objective, point: Point, cost: float) -> Point
         cost: Its cost, finite.
     """
     problem, found = objective.problem, None
-    low, high = np.array([(one.lower, one.upper) for one in problem.parameters]).T
+    low = np.array([one.lower for one in problem.parameters])
+    high = np.array([one.upper for one in problem.parameters])
     values = np.array(point.values)
     free = list(dict.fromkeys(objective.columns.parameter.tolist()))
     angles = [p for p in free if problem.parameters[p].unit == _ANGLE]
