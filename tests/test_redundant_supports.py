@@ -195,12 +195,12 @@ def test_derivatives_through_rest_on_two_feet():
     displacement and no velocity of the start survives, to 1e-9; and the derivative by
     the ramp is that of central differences, to 1e-6.
     """
+    feet = (-1.0, 1.0)
 
     def final(ramp):
         start = [0.0, 0.0, 0.0, 0.0]
         return np.asarray(jaxcam.simulate(Beam(feet, ramp=ramp), start, 0.0, 1.2).final)
 
-    feet = (-1.0, 1.0)
     y, off = np.array([0.0, 0.0, 0.0, 0.0, -1.2]), 1e-5
     arrival, matrix = flow_jacobian(_from, Beam(feet), y, Settings())
     np.testing.assert_allclose(arrival.state, final(-1.2), atol=1e-12)

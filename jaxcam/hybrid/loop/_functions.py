@@ -13,15 +13,11 @@ import numpy as np
 from .._system import HybridSystem
 from ..lowering import Memory, split
 from ..runge_kutta import rates_among
+from ..surface import ONE_DIRECTION
 from ._frame import Frame
 from ._gap_polynomial import Jet
 from ._programs import programs_of
 from ._select import everywhere, select, where_needed
-
-
-# Largest number of states (with a phase) of a body with one direction of motion, which
-# cannot rest on several constraints at once
-_ONE_MOTION = 3
 
 
 class Functions:
@@ -300,7 +296,7 @@ class Functions:
         pushes = tuple(
             jets[k].velocity - lengths[k] * frame.hurried[k][k] for k in rows
         )
-        if self.m > 1 and self.n > _ONE_MOTION:
+        if self.m > 1 and self.n > ONE_DIRECTION:
             number = sum(jnp.where(flag, 1.0, 0.0) for flag in held)
             lengths, pushes = self.where(
                 number > 1, lambda: self._onto_all(frame, jets, held), (lengths, pushes)

@@ -30,6 +30,7 @@ from ._impacts import (
 from ._impacts_together import (
     impacts_together as impacts_together,
     may_hit_together as may_hit_together,
+    ONE_DIRECTION as ONE_DIRECTION,
 )
 from ._joint_rest import (
     joint_rest as joint_rest,

@@ -100,8 +100,9 @@ def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array
     in contact, q is zero. If a support is redundant, q is that of
     `least_multipliers`.
     """
-    found = contact_forces(system, t, x, contact).multipliers
-    return multipliers_at_ends(system, t, x, contact, found)
+    terms = contact_terms(system, t, x)
+    found = contact_forces(system, t, x, contact, terms).multipliers
+    return multipliers_at_ends(system, t, x, contact, found, terms)
 
 
 def field_in_force(system, t, x, contact: Bool[Array, " m"]) -> State:

@@ -36,16 +36,18 @@ MOST_TOGETHER = 4
 MOST_WITH_FRICTION = 3
 
 
+ONE_DIRECTION = 3
+"""Largest number of states (with a phase) of a body with one direction of motion, which
+cannot touch several constraints at once."""
+
+
 def may_hit_together(system: HybridSystem, states: int, number: int) -> bool:
     """Return whether impacts may be applied together.
-
-    A body with one direction of motion, that is, up to three states (with a phase),
-    cannot approach several constraints at once.
 
     **Arguments:** the system, its number of states, and its number of constraints.
     """
     most = MOST_WITH_FRICTION if has_friction(system) else MOST_TOGETHER
-    return 1 < number <= most and states > 3
+    return 1 < number <= most and states > ONE_DIRECTION
 
 
 def impacts_together(

@@ -15,6 +15,8 @@ from ._masked import null_vector
 
 # An element of a null vector below this fraction of the largest is a rounding error
 _ZERO = 1e-9
+# Smallest number of supports of which two may be needed and several redundant
+_PAIRS = 4
 # Two supports do not hold a body if their determinant is below this fraction of the
 # product of the diagonal
 _PARALLEL = 1e-9
@@ -30,7 +32,7 @@ def least_multipliers(
 
     Each is that of a different solution, so together they are not in equilibrium. The
     multipliers are returned unchanged if no support is redundant, and also if several
-    are redundant and more than two supports are needed to hold the body.
+    are redundant unless two supports are needed to hold the body.
 
     **Arguments:** the changes of the normal accelerations (rows) by the multipliers
     (columns); the multipliers of the contact forces, negative if compressive; and which
@@ -38,7 +40,7 @@ def least_multipliers(
     """
     null, redundant = null_vector(matrix, contact)
     found = jnp.where(redundant == 1, _at_ends(null, multipliers), multipliers)
-    if len(multipliers) < 4:
+    if len(multipliers) < _PAIRS:
         return found
     needed = jnp.sum(jnp.where(contact, 1.0, 0.0)) - redundant
     pairs = _on_pairs(matrix, multipliers, contact)
