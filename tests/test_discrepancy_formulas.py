@@ -278,7 +278,22 @@ def test_damping_in_a_zone_is_a_formula_of_two_arguments():
     window = next(one for one in family.primitives if one.name == "window")
     text, words = formula_of(family, window, np.array([-0.3, 0.2, 0.6]), "force")
     assert text == "-0.3*(-0.1 < position)*(position < 0.5)*velocity"
-    assert words.startswith("damping that acts only between position -0.1 and 0.5")
+    assert words.startswith("damping that acts only between position -0.1 and 0.5 rad:")
+
+
+def test_words_have_units_where_the_argument_has_one():
+    """A time in s, a speed in the unit of the motion, and nothing for a pure number."""
+    step = next(f for f in _family(Variable.TIME).primitives if f.name == "step")
+    numbers = np.array([0.3, 0.5])
+    for variable, motion, place in [
+        (Variable.TIME, "mm", "time 0.55 s:"),
+        (Variable.VELOCITY, "mm", "velocity 0.35 mm/s:"),
+        (Variable.APPROACH, "rad", "speed 0.35 rad/s:"),
+        (Variable.POSITION, "-", "position 0.35:"),
+    ]:
+        family = dataclasses.replace(_family(variable), motion_unit=motion)
+        words = formula_of(family, step, numbers, "force")[1]
+        assert f"sets in at {place}" in words
 
 
 def test_a_formula_has_no_double_signs_and_no_phase_just_below_a_turn():

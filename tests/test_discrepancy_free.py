@@ -270,6 +270,7 @@ def test_an_undetermined_straight_line_has_no_part_in_the_error():
     assert np.max(level) == pytest.approx(0.01, rel=0.02)
     words = _words(family, "force", along, value, level)
     assert "differs most from a straight line at velocity" in words
+    assert "rad/s, by" in words and words.endswith("rad/s^2")
     # a function of time or phase may contain a slope
     timed = dataclasses.replace(family, argument=Variable.TIME)
     slope = level_of(timed, along, basis)[:, 1]

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxcam import simulate
-from jaxcam.discrepancy.report._hidden import hidden_formula
+from jaxcam.discrepancy.report._hidden import _argument, hidden_formula
 from jaxcam.discrepancy.search._hidden_kinds import (
     HYSTERESIS,
     RELAXATION,
@@ -296,3 +296,13 @@ def test_the_transfer_of_a_resonance_is_that_of_its_equation():
     expected = (2.0 + 0.3 * s) / (s**2 + 0.2 * w * s + w**2) + 5.0 + 0.2 * s
     found = jax.vmap(one.transfer)(jnp.asarray(frequency))
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_the_table_of_a_narrow_resonance_contains_its_peak():
+    """A damping ratio of 0.4 %: the peak is reached to 0.1 %."""
+    one = Resonator(frequency=14.0, ratio=0.004, by_state=900.0)
+    along = _argument(one, 144)
+    assert along[0] == pytest.approx(1.4) and along[-1] == pytest.approx(140.0)
+    peak = float(jnp.abs(one.transfer(jnp.asarray(14.0))))
+    shown = np.max(np.abs(jax.vmap(one.transfer)(jnp.asarray(along))))
+    assert shown == pytest.approx(peak, rel=1e-3)

@@ -172,15 +172,17 @@ def _outlook(found, nominal, predict: bool, propose: bool, seed: int, report):
     the next recording.
     """
     from .. import discrepancy
+    from ..recordings import Rig
     from ._outlook import Outlook
 
     outlook = Outlook()
-    if predict and found.verdict == discrepancy.Verdict.UNKNOWN:
+    unknown = found.verdict == discrepancy.Verdict.UNKNOWN
+    if predict and unknown and isinstance(nominal, Rig):
         outlook = Outlook(
             reason="No bifurcation speeds are predicted, because part of the missing "
             "physics is unknown."
         )
-    elif predict:
+    elif predict and not unknown:
         words = "predicting with and without the missing physics"
         speeds = discrepancy.predictions(
             found, progress=lambda share: report(words, share)

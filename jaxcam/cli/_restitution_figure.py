@@ -45,9 +45,14 @@ class _Law(NamedTuple):
 
 
 def has_law(found: Diagnosis) -> bool:
-    """Return whether a missing effect changes impacts that were measured."""
-    changes = any(effect.where == Where.IMPACT for effect in found.effects)
-    return changes and bool(len(_speeds(found)))
+    """Return whether a missing effect changes the restitution as a function of the
+    approach speed, at impacts that were measured.
+    """
+    named = any(one.where == Where.IMPACT and one.term for one in found.effects)
+    free = any(
+        one.kind == "restitution" and "speed" in one.arguments for one in found.missing
+    )
+    return (named or free) and bool(_speeds(found))
 
 
 def restitution(plt, found: Diagnosis):

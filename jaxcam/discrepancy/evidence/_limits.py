@@ -11,13 +11,15 @@ from ..search import newton_step, Trial, Trials
 class Limit(NamedTuple):
     """The smallest strength that would be named, its standard error and its unit.
 
-    `hidden` is the rig parameter that would absorb most of the effect.
+    `hidden` is the rig parameter that would absorb most of the effect, and `confusion`
+    the ratio of the standard error to that for known values of all other parameters.
     """
 
     size: float
     stderr: float
     unit: str
     hidden: str
+    confusion: float
 
 
 def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
@@ -54,5 +56,7 @@ def limits(trials: Trials, trial: Trial) -> dict[str, Limit]:
                 hidden = blocks.names[rig[int(np.argmax(np.abs(taken) / own))]]
             size = stderr * float(blocks.scale[row[0]])
             threshold = math.sqrt(trials.threshold(term.name)) + trials.policy.beyond
-            found[one.name] = Limit(size * threshold, size, one.unit, hidden)
+            alone = information[row[0], row[0]]
+            confusion = stderr * math.sqrt(alone) if alone > 0 else math.inf
+            found[one.name] = Limit(size * threshold, size, one.unit, hidden, confusion)
     return found

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..terms import Factor, Family, Primitive, Variable, Where
+from ..terms import Factor, Family, Primitive, unit_along, Variable, Where
 from ._words import quantity
 
 
@@ -44,37 +44,42 @@ _FORMULAS = {
 }
 _WORDS = {
     "straight": "grows with the {x}",
-    "above": "acts only above {x} {a}, and grows from there",
-    "below": "acts only below {x} {a}, and grows from there",
-    "step": "sets in at {x} {a}",
-    "window": "acts only between {x} {a} and {b}",
-    "bump": "acts only around {x} {a}, over about {width}",
-    "square": "grows with the square of the {x}, measured from {middle}",
-    "parabola": "grows with the square of the distance from {x} {a}",
-    "cube": "grows with the cube of the {x}, measured from {middle}",
-    "exponential": "{trend} exponentially with the {x}, by a factor e over {span}",
+    "above": "acts only above {x} {a}{unit}, and grows from there",
+    "below": "acts only below {x} {a}{unit}, and grows from there",
+    "step": "sets in at {x} {a}{unit}",
+    "window": "acts only between {x} {a} and {b}{unit}",
+    "bump": "acts only around {x} {a}{unit}, over about {width}{unit}",
+    "square": "grows with the square of the {x}, measured from {middle}{unit}",
+    "parabola": "grows with the square of the distance from {x} {a}{unit}",
+    "cube": "grows with the cube of the {x}, measured from {middle}{unit}",
+    "exponential": "{trend} exponentially with the {x}, by a factor e over "
+    "{span}{unit}",
     "power": "grows as the {x} to the power {power}",
-    "settling": "settles exponentially with the {x}, over {span}",
-    "wave": "oscillates with the {x}, with a wavelength of {wavelength}",
+    "settling": "settles exponentially with the {x}, over {span}{unit}",
+    "wave": "oscillates with the {x}, with a wavelength of {wavelength}{unit}",
     "dry": "has a constant size and the direction of the {x}",
     "forward": "acts only while the {x} is positive",
     "backward": "acts only while the {x} is negative",
     "falling": "opposes the motion near rest and decreases with the {x}, over about "
-    "{decay}",
-    "curved above": "acts only above {x} {a}, and grows from there with "
+    "{decay}{unit}",
+    "curved above": "acts only above {x} {a}{unit}, and grows from there with "
     "the power {exponent} of the distance",
-    "curved below": "acts only below {x} {a}, and grows from there with "
+    "curved below": "acts only below {x} {a}{unit}, and grows from there with "
     "the power {exponent} of the distance",
-    "dead zone": "does not act between {x} {left} and {right}, and grows beyond them",
-    "saturating": "changes with the {x} around {a}, over about {width}, and saturates",
-    "fast": "acts only where the speed exceeds {edge}, and grows from there",
+    "dead zone": "does not act between {x} {left} and {right}{unit}, and grows "
+    "beyond them",
+    "saturating": "changes with the {x} around {a}{unit}, over about {width}{unit}, "
+    "and saturates",
+    "fast": "acts only where the speed exceeds {edge}{unit}, and grows from there",
     "power of speed": "grows as the speed to the power {power}",
     "harmonic 1": "varies once per cycle",
     "harmonic 2": "varies twice per cycle",
     "harmonic 3": "varies three times per cycle",
-    "half turn": "acts in one half of each cycle, from {x} {turn}",
-    "arc": "acts only in part of each cycle, around {x} {turn}, over +-{half}",
-    "bump in turn": "acts only around {x} {turn} in each cycle, over about {half}",
+    "half turn": "acts in one half of each cycle, from {x} {turn}{unit}",
+    "arc": "acts only in part of each cycle, around {x} {turn}{unit}, over "
+    "+-{half}{unit}",
+    "bump in turn": "acts only around {x} {turn}{unit} in each cycle, over about "
+    "{half}{unit}",
 }
 _THINGS = {
     "force": "a force",
@@ -178,7 +183,12 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
         "rim": math.cos(second),
         "half": abs(second),
     }
-    words = {"x": x, "trend": "decays" if first < 0 else "grows"}
+    unit = unit_along(family.argument, family.motion_unit)
+    words = {
+        "x": x,
+        "trend": "decays" if first < 0 else "grows",
+        "unit": quantity("", unit),
+    }
     return {name: f"{value:.4g}" for name, value in shown.items()} | words
 
 

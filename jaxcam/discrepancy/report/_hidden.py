@@ -9,6 +9,7 @@ import numpy as np
 from ...fitting import Fit
 from ..search import Hidden
 from ..terms import HiddenElement, Hysteresis, Relaxation, Resonator
+from ._curves import graded
 from ._words import quantity
 
 
@@ -53,7 +54,10 @@ def hidden_table(found: Fit, hidden: Hidden, points: int):
 def _argument(element: HiddenElement, points: int) -> np.ndarray:
     if isinstance(element, Resonator):
         f = float(element.frequency)
-        return np.geomspace(f / _DECADE, f * _DECADE, points)
+        even = np.linspace(math.log(f / _DECADE), math.log(f * _DECADE), points)
+        along = np.exp(graded(even, lambda x: _curve(element, np.exp(x))))
+        along[np.argmin(np.abs(along - f))] = f
+        return along
     if isinstance(element, Relaxation):
         return np.linspace(0.0, _TIMES * float(element.time), points)
     assert isinstance(element, Hysteresis)

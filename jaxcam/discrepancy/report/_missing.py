@@ -19,6 +19,7 @@ from ..terms import (
     HiddenElement,
     Resonator,
     terms_of,
+    unit_along,
     Variable,
     Where,
 )
@@ -35,6 +36,7 @@ from ._curves import (
 from ._formula import formula_of
 from ._hidden import hidden_formula, hidden_table, hidden_unit, hidden_words
 from ._product import product_of, product_slopes, product_table
+from ._words import quantity
 
 
 _KINDS = {
@@ -52,6 +54,8 @@ _VERBS = {
     "surface": "a surface error",
     "sensor": "a sensor error",
 }
+# units of a damping and of a stiffness, both divided by the inertia
+_FACTOR_UNITS = {Factor.VELOCITY: "1/s", Factor.DEFLECTION: "1/s^2"}
 _ARGUMENT_NAMES = {Variable.APPROACH: "speed"}
 
 
@@ -315,10 +319,13 @@ def _words(family: Family, kind: str, along, value, error) -> str:
     if not np.any(sure):
         return f"{what}; its location is unclear"
     usual = "a constant" if degree_of(family) == 0 else "a straight line"
-    return (
-        f"{what}; it differs most from {usual} at {family.argument} {along[k]:.3g}, "
-        f"by {level[k]:.2g} +- {error[k]:.1g}"
+    unit = unit_along(family.argument, family.motion_unit)
+    place = quantity(f"{along[k]:.3g}", unit)
+    by = quantity(
+        f"{level[k]:.2g} +- {error[k]:.1g}",
+        _FACTOR_UNITS.get(family.factor, _unit(family)),
     )
+    return f"{what}; it differs most from {usual} at {family.argument} {place}, by {by}"
 
 
 def sentence_of(functions: Sequence[MissingFunction]) -> str:

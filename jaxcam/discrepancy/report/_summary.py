@@ -120,10 +120,11 @@ def summary_of_functions(
 def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
     fitted, unseen = rms_of(choice.named.best.fit), choice.held.after
     tail = ""
-    for name, limit in least.items():
+    if least:
+        # the effect that the rig parameters can imitate least
+        name, limit = min(least.items(), key=lambda item: item[1].confusion)
         size = quantity(f"{limit.size:.2g}", limit.unit)
         tail = f" For example, {name} = {size} would have been detected."
-        break
     if fitted > policy.as_noise:
         return (
             "No missing physics common to the recordings was detected. However, the "
