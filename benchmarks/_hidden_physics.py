@@ -91,6 +91,12 @@ EFFECTS = {
         0.03,
         0.1,
     ),
+    "detent": _force(
+        _AT_PLACE,
+        lambda u, w, phi, t, s: (0.2 - u) * np.exp(-0.5 * ((u - 0.2) / 0.15) ** 2),
+        0.3,
+        0.9,
+    ),
     "detents": _force(
         _AT_PLACE, lambda u, w, phi, t, s: np.sin(2 * np.pi * 1.8 * u), 0.03, 0.1
     ),

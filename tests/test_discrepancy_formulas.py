@@ -37,6 +37,7 @@ NUMBERS = {
     "curved below": (3.0, 0.3, 2.0),
     "dead zone": (2.0, 0.5, 0.2),
     "saturating": (1.5, 0.4, 0.1),
+    "detent": (-1.2, 0.6, 0.1),
     "fast": (-0.8, 0.2),
     "power of speed": (-0.8, 1.5),
     "harmonic 1": (0.6, 0.5),
@@ -271,6 +272,22 @@ def test_an_elastic_stop_is_said_to_be_one():
     assert "as an elastic stop would" in words
     pulled = formula_of(family, above, np.array([30.0, 0.5]), "force")[1]
     assert "elastic stop" not in pulled and "pulls above 0.35 rad" in pulled
+
+
+def test_a_detent_pulls_and_a_barrier_pushes():
+    """Towards its place, with its greatest force at the stated distance."""
+    family = _family(Variable.POSITION)
+    detent = next(one for one in family.primitives if one.name == "detent")
+    text, words = formula_of(family, detent, np.array([-2.0, 0.6, 0.1]), "force")
+    assert (
+        "pulls towards position 0.5 rad, most strongly at a distance of 0.15" in words
+    )
+    at = 0.5 + 0.15 * np.linspace(-3, 3, 601)
+    force = eval(text, {"exp": np.exp, "position": at})
+    assert at[np.argmax(force)] == pytest.approx(0.35, abs=2e-3)
+    assert force.max() == pytest.approx(2.0, rel=1e-3)
+    words = formula_of(family, detent, np.array([2.0, 0.6, 0.1]), "force")[1]
+    assert "pushes away from position 0.5 rad" in words
 
 
 def test_damping_in_a_zone_is_a_formula_of_two_arguments():

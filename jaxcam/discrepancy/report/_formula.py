@@ -33,6 +33,7 @@ _FORMULAS = {
     "curved below": "{size}*(max({a} - {x}, 0)/{range})**{exponent}",
     "dead zone": "{slope}*(max({x} - {right}, 0) - max({left} - {x}, 0))",
     "saturating": "{size}*tanh(({x} - {a})/{width})",
+    "detent": "{size}*({x} - {a})/{width}*exp(0.5 - (({x} - {a})/{width})**2/2)",
     "fast": "{slope}*sign({x})*max(abs({x}) - {edge}, 0)",
     "power of speed": "{size}*sign({x})*abs({x}/{half_range})**{power}",
     "harmonic 1": "{size}*cos({x} - {turn})",
@@ -70,6 +71,7 @@ _WORDS = {
     "beyond them",
     "saturating": "changes with the {x} around {a}{unit}, over about {width}{unit}, "
     "and saturates",
+    "detent": "{pulls} {x} {a}{unit}, most strongly at a distance of {width}{unit}",
     "fast": "acts only where the speed exceeds {edge}{unit}, and grows from there",
     "power of speed": "grows as the speed to the power {power}",
     "harmonic 1": "varies once per cycle",
@@ -187,6 +189,7 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
     words = {
         "x": x,
         "trend": "decays" if first < 0 else "grows",
+        "pulls": "pulls towards" if size < 0 else "pushes away from",
         "unit": quantity("", unit),
     }
     return {name: f"{value:.4g}" for name, value in shown.items()} | words

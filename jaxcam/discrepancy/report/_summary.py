@@ -1,6 +1,7 @@
 """Summarise a verdict in one or two sentences."""
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 
 from ...fitting import Fit
@@ -121,8 +122,10 @@ def _nothing(choice: Choice, least: Mapping[str, Limit], policy: Policy) -> str:
     fitted, unseen = rms_of(choice.named.best.fit), choice.held.after
     tail = ""
     if least:
-        # the effect that the rig parameters can imitate least
-        name, limit = min(least.items(), key=lambda item: item[1].confusion)
+        # the first of the effects that the rig parameters cannot imitate well
+        usual = statistics.median(one.confusion for one in least.values())
+        clear = {name: one for name, one in least.items() if one.confusion <= usual}
+        name, limit = next(iter((clear or least).items()))
         size = quantity(f"{limit.size:.2g}", limit.unit)
         tail = f" For example, {name} = {size} would have been detected."
     if fitted > policy.as_noise:

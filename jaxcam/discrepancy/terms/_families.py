@@ -14,6 +14,7 @@ from ._primitives import (
     FROM_ZERO,
     OF_FACTORS,
     OF_PHASE,
+    OF_POSITION,
     OF_SPEED,
     OF_TIME,
     ON_A_LINE,
@@ -112,12 +113,9 @@ class Family:
             return (*ON_A_LINE, *FROM_ZERO, *OF_TIME)
         if self.argument is Variable.APPROACH:
             return (*ON_A_LINE, *FROM_ZERO)
-        more = OF_SPEED if self.jumps else ()
-        return (
-            *ON_A_LINE,
-            *more,
-            *(OF_FACTORS if self.factor is not Factor.ONE else ()),
-        )
+        if self.factor is not Factor.ONE:
+            return (*ON_A_LINE, *OF_FACTORS)
+        return (*ON_A_LINE, *(OF_SPEED if self.jumps else OF_POSITION))
 
     @property
     def summands(self) -> tuple[Primitive, ...]:

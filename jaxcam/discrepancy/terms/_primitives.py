@@ -183,6 +183,17 @@ WAVE = Primitive(
     (_shares(0.75, 8.0, 30), _EVERY[::3]),
     (0.1, 0.3),
 )
+# the derivative of a bump: the force of a potential well or barrier
+DETENT = Primitive(
+    "detent",
+    lambda at, p: (
+        p[0] * (at.u - p[1]) / p[2] * at.xp.exp(0.5 - ((at.u - p[1]) / p[2]) ** 2 / 2)
+    ),
+    (_INSIDE, (0.03, 0.05, 0.08, 0.12, 0.2, 0.3)),
+    (0.05, 0.03),
+    places=(1,),
+    limits=((2, _EDGE),),
+)
 DRY = Primitive("dry", lambda at, p: p[0] + 0.0 * at.u, odd=True)
 FORWARD = Primitive("forward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=0.5)
 BACKWARD = Primitive("backward", lambda at, p: p[0] / 2 + 0.0 * at.u, jump=-0.5)
@@ -265,6 +276,7 @@ OF_TIME = (SETTLING,)
 # the rig parameters represent a force that is linear in the position, but not such a
 # force times a factor
 OF_FACTORS = (PARABOLA,)
+OF_POSITION = (DETENT,)
 OF_SPEED = (FORWARD, BACKWARD, FALLING, FAST, POWER_OF_SPEED)
 # dry friction alone is a named term
 ONLY_IN_SUMS = (DRY,)
@@ -278,6 +290,7 @@ PRIMITIVES = (
     *OF_TIME,
     *OF_FACTORS,
     *ONLY_IN_SUMS,
+    *OF_POSITION,
 )
 """All forms, in the order of their indices in a compiled program."""
 MOST_NUMBERS = max(one.count for one in PRIMITIVES)

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from ..codes import ACCUMULATES, PAINLEVE, RUNNING
 from ..surface import forced_time, start_room
@@ -155,10 +156,13 @@ def first_state(
 
 
 def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
-    m, free = functions.m, tuple(jnp.asarray(False) for _ in range(functions.m))
+    # flags that are known now, not only in the program, make it shorter
+    m, free = functions.m, (np.bool_(False),) * functions.m
     sides, crossings, slides, stuck = first_sides(functions, t0, x, free)
     free = free + sides
     jets = functions.jets(t0, x, free)[:m] if m else []
+    # only used without contact
+    rates = functions.taylor(t0, x, free)
     lifts = functions.lift(t0, x, free)
     whole = functions.blur(t0, x, (0.0,) * functions.n, free)
     blurs = whole[:m], functions.speed_blur(t0, x, free)
@@ -211,7 +215,6 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     # in contact, the error estimate may be uninformative, so the step length is limited
     held = any_of(contact)
     mode = tuple(contact) + sides
-    rates = functions.taylor(t0, x, mode)
     settled += crossings
     first = jnp.where(held, longest, first_step(extents, rates, t0, longest))
     x = select(status == RUNNING, x, (jnp.nan,) * len(x))

@@ -1,6 +1,7 @@
 """Reject invalid starts, traced or not, and find the sides on which motions start."""
 
 import jax.numpy as jnp
+import numpy as np
 
 from ..codes import BACKWARD, BEHIND, NOT_FINITE, RUNNING
 from ..surface import gaps, least_gaps
@@ -42,7 +43,7 @@ def first_sides(functions: Functions, t, x, contact):
     if not functions.k:
         return (), [], False, False
     sides = list(functions.sides(t, x))
-    free = (jnp.asarray(False),) * functions.k
+    free = (np.bool_(False),) * functions.k
     slides, stuck = list(free), jnp.asarray(False)
     touched = list(free)
 
@@ -52,10 +53,8 @@ def first_sides(functions: Functions, t, x, contact):
         """
         mode = (*contact, *sides[:k], flag, *sides[k + 1 :], *free)
         jets, roundings = functions.open_surfaces(t, x, mode)
-        jet, rounding = jets[k], roundings[k]
-        on = jnp.abs(jet.gap) <= rounding
-        jet = jet._replace(gap=jnp.where(on, 0.0, jet.gap))
-        return jet, on, on & moves_in(jet, rounding)
+        jet, on = _rounded(jets[k], roundings[k])
+        return jet, on, on & moves_in(jet, roundings[k])
 
     for k in range(functions.one_way):
         crossed = [jnp.asarray(False)] * functions.k
@@ -78,8 +77,17 @@ def first_sides(functions: Functions, t, x, contact):
             stuck = stuck | (leaves & on & back)
         sides[k] = flag ^ (leaves & ~back)
     sides, slides = _held_together(functions, t, x, contact, sides, touched, slides)
-    jets: list[Jet] = [jet_of(k, flag)[0] for k, flag in enumerate(sides)]
+    jets, roundings = functions.open_surfaces(t, x, (*contact, *sides, *free))
+    jets = [_rounded(*pair)[0] for pair in zip(jets, roundings, strict=True)]
     return (*sides, *slides), jets, any_of(slides), stuck
+
+
+def _rounded(jet: Jet, rounding):
+    """Return a jet without the rounding error of a distance of zero, and whether it is
+    zero.
+    """
+    on = jnp.abs(jet.gap) <= rounding
+    return jet._replace(gap=jnp.where(on, 0.0, jet.gap)), on
 
 
 def _held_together(functions: Functions, t, x, contact, sides, touched, slides):
