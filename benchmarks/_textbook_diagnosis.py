@@ -39,12 +39,6 @@ class Oscillator(HybridSystem):
         push = self.gain * self.input - self.stiffness * x - self.damping * v
         return jnp.stack([v, push])
 
-    def gap(self, t, state):
-        return jnp.ones_like(t)
-
-    def impact(self, t, state):
-        return state
-
 
 class Stopped(Oscillator):
     """The same oscillator below a stop."""

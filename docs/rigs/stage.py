@@ -17,10 +17,3 @@ class Stage(HybridSystem):
 
     def vector_field(self, t, state):
         return jnp.stack([state[1], self.gain * self.voltage - self.damping * state[1]])
-
-    def gap(self, t, state):
-        # no stop: the gap is always open
-        return jnp.ones_like(t)
-
-    def impact(self, t, state):
-        return state

@@ -159,7 +159,7 @@ def _flow(system, settings, state, t0, t1, max_steps: int) -> Arrival:
     x = tuple(state[i] for i in range(state.shape[0]))
     carried = first_state(functions, t0, x, t1, plan.longest_step, plan.repeat)
     carried = jax.tree.map(jnp.asarray, carried)
-    start = jnp.stack(carried.mode) if carried.mode else jnp.zeros(0, bool)
+    start = carried.flags
 
     def attempt(both):
         carried, events, order = both

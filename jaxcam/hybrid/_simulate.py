@@ -245,7 +245,7 @@ def _reversible(system, settings, t0, state, t1, rows: int):
 
 def _of_rows(runner, system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, True)
-    mode = jnp.stack(carried.mode)
+    mode = carried.flags
     # with an invalid start, all states are NaN
     valid = (carried.status == RUNNING) | (carried.status == PAINLEVE)
     state = jnp.where(valid, state, jnp.nan)

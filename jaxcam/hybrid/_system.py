@@ -1,9 +1,10 @@
-"""A hybrid system, defined by its parameters and three functions of time and state."""
+"""A hybrid system, defined by its parameters and functions of time and state."""
 
 import abc
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._types import RealScalar
@@ -12,15 +13,16 @@ from ._types import RealScalar
 class HybridSystem(eqx.Module):
     """A mechanical system with impacts: free flight between impacts on its constraints.
 
-    Subclass it, define the three methods below, and declare the parameters as fields:
+    Subclass it, define the methods below, and declare the parameters as fields:
     every floating-point field is a parameter. A `where` function, such as
     `lambda s: s.speed`, selects a parameter to sweep, to fit, to continue, or to
     differentiate with respect to.
 
-    All three methods take the time `t` (seconds, a scalar) and the state (shape
+    The methods take the time `t` (seconds, a scalar) and the state (shape
     `(n,)`), must be smooth in both, and are written with `jax.numpy`. With one
     constraint, `gap` returns a scalar; with `m` constraints, it returns shape `(m,)`
-    and `impact` returns shape `(m, n)`, one row for each constraint.
+    and `impact` returns shape `(m, n)`, one row for each constraint. Without
+    constraints, only `vector_field` is needed.
 
     Everything else (normal velocity, acceleration and jerk of the gap, the sticking
     field, release and the completion of chatter) is derived from these functions by
@@ -68,11 +70,12 @@ class HybridSystem(eqx.Module):
             Rate of change of the state, shape `(n,)`.
         """
 
-    @abc.abstractmethod
     def gap(
         self, t: RealScalar, state: Float[Array, " n"]
     ) -> Float[Array, "*constraints"]:
         """Return the gap: positive in flight, zero in contact (thesis, eq. 2.23).
+
+        By default, it is always one: there are no constraints.
 
         Args:
             t: Time (s).
@@ -81,8 +84,9 @@ class HybridSystem(eqx.Module):
         Returns:
             The gap, a scalar, or shape `(m,)` for m constraints.
         """
+        del state
+        return jnp.ones_like(t)
 
-    @abc.abstractmethod
     def impact(
         self, t: RealScalar, state: Float[Array, " n"]
     ) -> Float[Array, "*constraints n"]:
@@ -98,8 +102,10 @@ class HybridSystem(eqx.Module):
 
         Returns:
             State after the impact, shape `(n,)`, or one row per constraint, shape
-                `(m, n)`.
+                `(m, n)`. By default, the state is unchanged.
         """
+        del t
+        return state
 
     @property
     def period(self) -> Any:

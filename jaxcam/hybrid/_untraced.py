@@ -53,7 +53,7 @@ def _by_llvm(system, settings, t0, state, t1, budget, progress):
 @eqx.filter_jit
 def _begin(system, settings, t0, state, t1, rows):
     functions, plan, carried = prepare(system, settings, t0, state, t1, False)
-    mode = jnp.stack(carried.mode)
+    mode = carried.flags
     carried, log = run(functions, plan, carried, rows, "one")
     return carried, log, mode
 

@@ -164,6 +164,37 @@ def check_system(system, t0, state, settings: Settings) -> None:
         _SOUND.add(numbers)
 
 
+def missing_method(kind: type[HybridSystem]) -> str | None:
+    """Return the name of a method that a class must still define, or `None`.
+
+    Args:
+        kind: The class. A `gap` needs an `impact`, and the other way round.
+
+    Returns:
+        The name of the method.
+
+    Examples:
+        >>> from jaxcam.hybrid.checks import missing_method
+        >>> class Wall(jaxcam.HybridSystem):
+        ...     def vector_field(self, t, state):
+        ...         return -state
+        ...     def gap(self, t, state):
+        ...         return state[0]
+        >>> missing_method(Wall)
+        'impact'
+    """
+    if kind.__abstractmethods__:
+        return min(kind.__abstractmethods__)
+    bases = HybridSystem, SwitchedSystem
+    gap, impact = (
+        all(getattr(kind, name) is not getattr(base, name) for base in bases)
+        for name in ("gap", "impact")
+    )
+    if gap == impact:
+        return None
+    return "impact" if gap else "gap"
+
+
 def _check_switches(system: SwitchedSystem) -> None:
     if not np.all(np.asarray(system.hysteresis) >= 0):
         raise ValueError(f"hysteresis is {system.hysteresis}; it cannot be negative")
@@ -210,6 +241,9 @@ def _check_modes(system: HybridAutomaton, t0, state) -> None:
 
 
 def _check_shapes(system, t0, state) -> None:
+    missing = missing_method(type(system))
+    if missing is not None:
+        raise ValueError(f"{type(system).__name__} has no {missing}; add that method")
     n = state.shape[0]
     wanted = len(system.state_names)
     if wanted and wanted != n:
@@ -228,6 +262,11 @@ def _check_shapes(system, t0, state) -> None:
     if len(gap.shape) > 1:
         raise ValueError(
             f"gap returns shape {gap.shape}; return a scalar or a vector of gaps"
+        )
+    if gap.shape == (0,) and not isinstance(system, SwitchedSystem):
+        raise ValueError(
+            "gap returns no values; leave out gap and impact if there are no "
+            "constraints"
         )
     after = _shape(system, "impact", t0, state)
     if after.shape != (*gap.shape, n):

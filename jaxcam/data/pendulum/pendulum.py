@@ -17,9 +17,3 @@ class Pendulum(HybridSystem):
     def vector_field(self, t, state):
         angle, rate = state
         return jnp.stack([rate, -self.stiffness * jnp.sin(angle - self.hanging)])
-
-    def gap(self, t, state):
-        return jnp.ones_like(t)  # without constraints
-
-    def impact(self, t, state):
-        return state

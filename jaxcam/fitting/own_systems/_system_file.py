@@ -11,6 +11,7 @@ from types import ModuleType
 import equinox as eqx
 
 from ...hybrid import HybridSystem
+from ...hybrid.checks import missing_method
 from ...recordings import RigError
 from ...recordings.files import printable
 
@@ -59,9 +60,9 @@ def system_class(named: str, folder: str | Path = ".") -> type[HybridSystem]:
             f"{file}: `{name}` is not a HybridSystem; derive it from "
             "jaxcam.HybridSystem."
         )
-    missing = sorted(cls.__abstractmethods__)
-    if missing:
-        raise RigError(f"{file}: `{name}` has no `{missing[0]}`; add that method.")
+    missing = missing_method(cls)
+    if missing is not None:
+        raise RigError(f"{file}: `{name}` has no `{missing}`; add that method.")
     return cls
 
 

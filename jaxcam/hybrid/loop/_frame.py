@@ -35,6 +35,21 @@ def frame_of(system, t, x):
 
 
 def lift_of(system, t, x):
-    """Return, for each gap, the displacement of the state that increases it by one."""
+    """Return, for each gap, the displacement of the state that increases it by one, to
+    first order; zero for a gap that does not depend on the state.
+    """
     gradient = jax.jacfwd(lambda y: gaps(system, t, y))(x)
-    return gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
+    square = jnp.sum(gradient * gradient, axis=1)[:, None]
+    return gradient / jnp.where(square > 0, square, 1.0)
+
+
+def lift_and_rest(system, t, x):
+    """Return `lift_of`, and what is left of each gap after the displacement that would
+    close it if it were linear; unlimited for a gap that does not depend on the state.
+    """
+    lift, present = lift_of(system, t, x), gaps(system, t, x)
+    left = [
+        jnp.where(jnp.any(row != 0), gaps(system, t, x - gap * row)[k], jnp.inf)
+        for k, (row, gap) in enumerate(zip(lift, present, strict=True))
+    ]
+    return lift, jnp.stack(left)

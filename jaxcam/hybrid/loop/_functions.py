@@ -245,10 +245,13 @@ class Functions:
         return Frame(*(tuple(map(tuple, part)) for part in parts))
 
     def lift(self, t, x, mode):
-        """Return, for each gap, the displacement of the state that opens it by one."""
+        """Return, for each gap, the displacement of the state that opens it by one, and
+        what is left of the gap after the displacement that should close it.
+        """
         if not self.m:
-            return ()
-        return tuple(map(tuple, self._call("lift", t, _pack(x), *self._side(mode))))
+            return (), ()
+        rows, left = self._call("lift", t, _pack(x), *self._side(mode))
+        return tuple(map(tuple, rows)), tuple(left)
 
     def blur(self, t, x, extents, mode):
         """Return the rounding errors of the gaps, then of the distances from surfaces,

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Bool
 
 from ..codes import ACCUMULATES, PAINLEVE, RUNNING
 from ..surface import forced_time, start_room
@@ -75,6 +76,11 @@ class LoopState(NamedTuple):
     impacts: Any
     # number of completed chatters
     chatters: Any
+
+    @property
+    def flags(self) -> Bool[Array, " flags"]:
+        """The mode as an array."""
+        return jnp.stack(self.mode) if self.mode else jnp.zeros(0, bool)
 
     @property
     def contact(self) -> tuple:
@@ -163,7 +169,7 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     jets = functions.jets(t0, x, free)[:m] if m else []
     # only used without contact
     rates = functions.taylor(t0, x, free)
-    lifts = functions.lift(t0, x, free)
+    lifts, left = functions.lift(t0, x, free)
     whole = functions.blur(t0, x, (0.0,) * functions.n, free)
     blurs = whole[:m], functions.speed_blur(t0, x, free)
     time = forced_time(period)
@@ -174,7 +180,7 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     status = first_status(t0, x, t1, [jet.gap for jet in jets], tinies)
     if crossings:
         status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
-    origin, extents = first_extents(lifts, jets, tinies, x)
+    origin, extents = first_extents(lifts, left, jets, tinies, x)
     settled, touched = [], []
     for jet, lift, tiny, slow in zip(jets, lifts, tinies, slows, strict=True):
         gap, velocity = jet.gap, jet.velocity

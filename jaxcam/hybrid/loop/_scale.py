@@ -20,23 +20,26 @@ _SHARE = 2.0
 _FIRST = 0.125
 
 
-def first_extents(lifts, jets, tinies, x) -> tuple[tuple, tuple]:
+def first_extents(lifts, left, jets, tinies, x) -> tuple[tuple, tuple]:
     """Return the origins of the components, and their scales before they have moved.
 
     A component on which a gap depends is measured from its start and has the scale of
     that gap, wherever the origin of its coordinate is; for any other component, the
     scale is its magnitude. With several gaps, the smallest scale counts. A gap that
-    cannot be distinguished from zero (up to its value in `tinies`) counts as zero.
+    cannot be distinguished from zero (up to its value in `tinies`) counts as zero. A
+    gap that is far from linear, so that more than itself would be `left` after the
+    displacement that should close it, has no scale: its gradient may vanish.
     """
     origin, found = [], []
     for i, component in enumerate(x):
         own, least = jnp.abs(component), jnp.asarray(jnp.inf)
-        for lift, jet, tiny in zip(lifts, jets, tinies, strict=True):
+        for lift, rest, jet, tiny in zip(lifts, left, jets, tinies, strict=True):
             # the gradient is lift / |lift|^2
             square = sum(e * e for e in lift)
             height, share = jnp.abs(jet.gap), jnp.abs(lift[i])
+            straight = (jnp.abs(rest) <= height) | (height <= tiny)
             height = jnp.where(height <= tiny, 0.0, height)
-            seen = share > 0
+            seen = (share > 0) & straight
             # the component's share of the shortest path to the surface, and the length
             # of the path along which only this component changes
             alone = height * square / jnp.where(seen, share, 1.0)

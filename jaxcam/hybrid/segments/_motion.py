@@ -10,7 +10,7 @@ import numpy as np
 import optimistix as optx
 
 from .._system import HybridSystem
-from ..loop import first_extents, Jet
+from ..loop import first_extents, Jet, lift_and_rest
 from ..programs import program
 from ..surface import (
     completion_time,
@@ -203,11 +203,12 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def extents(self, t, x):
         """Return the origins and the initial scales of the components, each `(n,)`."""
-        gradient = jax.jacfwd(lambda y: gaps(self.system, t, y))(x)
-        lifts = gradient / jnp.sum(gradient * gradient, axis=1)[:, None]
+        lifts, left = lift_and_rest(self.system, t, x)
         jets = [Jet(*row) for row in jnp.stack(self._free_series(3)(t, x), axis=1)]
         tinies = least_gaps(self.system, t, x) - gaps(self.system, t, x)
-        origin, found = first_extents(list(lifts), jets, list(tinies), tuple(x))
+        origin, found = first_extents(
+            list(lifts), list(left), jets, list(tinies), tuple(x)
+        )
         return jnp.stack(origin), jnp.stack(found)
 
     @_compiled

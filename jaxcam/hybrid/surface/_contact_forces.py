@@ -80,15 +80,19 @@ def contact_forces(
     terms: ContactTerms | None = None,
 ) -> ContactForces:
     """Return the multipliers and the field; `terms` are computed unless given."""
+    if not contact.shape[0]:
+        return ContactForces(jnp.zeros((0,)), system.vector_field(t, x))
     terms = contact_terms(system, t, x) if terms is None else terms
     drift, gradient, _ = terms
     free, pushes = system.vector_field(t, x), _pushes(system, t, x, terms)
     acceleration = drift + gradient @ free
+    # a gap may have no gradient, and its constraint no direction, away from contact
+    acting = jnp.where(contact[:, None], pushes, 0.0)
     if len(pushes) == 1 and not has_friction(system):
         found = jnp.where(contact, acceleration, jnp.zeros_like(acceleration))
-        return ContactForces(found, free - found[0] * pushes[0])
+        return ContactForces(found, free - found[0] * acting[0])
     found = solve_masked(gradient @ pushes.T, acceleration, contact)
-    return ContactForces(found, free - jnp.sum(found[:, None] * pushes, axis=0))
+    return ContactForces(found, free - jnp.sum(found[:, None] * acting, axis=0))
 
 
 def contact_multipliers(system, t, x, contact: Bool[Array, " m"]) -> Float[Array, " m"]:

@@ -195,8 +195,10 @@ def unit_directions(system, t, x, gradient: Float[Array, "m n"]):
             (x,),
             (gradient[k],),
         )
-        # only the direction matters, because its length is fixed by v_x D = 1
-        rows.append(moved / jnp.sum(gradient[k] * moved))
+        # only the direction matters, because its length is fixed by v_x D = 1; a gap
+        # that does not depend on the state has none
+        constant = jnp.all(gradient[k] == 0)
+        rows.append(moved / jnp.where(constant, 1.0, jnp.sum(gradient[k] * moved)))
     return jnp.stack(rows)
 
 
