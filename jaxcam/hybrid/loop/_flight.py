@@ -61,6 +61,7 @@ def judge(
     room,
     longest,
     calm: bool = False,
+    held: bool = False,
     where: Callable = everywhere,
 ) -> StepVerdict:
     """Check the step of one free constraint for events.
@@ -70,16 +71,18 @@ def judge(
     far, the time left to the next requested time (an impact beyond it waits for a later
     step), and the longest step that the error allows. If `calm`, at a Poincaré section,
     a motion may stay at a distance that is tolerated; otherwise, rounding would make a
-    motion at rest on the section cross it endlessly. `where` selects the results of
-    parts that are rarely needed.
+    motion at rest on the section cross it endlessly. `held` tells whether friction may
+    hold a body at the constraint. `where` selects the results of parts that are rarely
+    needed.
     """
     polynomial = bernstein(left, right, h)
-    inward = moves_in(right, rounding)
+    own = longest if held else None
+    inward = moves_in(right, rounding, own)
     if calm:
         inward = inward & ((left.gap >= 0) | (right.gap < -slack))
     behind = (right.gap < -slack) | ((right.gap < 0) & inward)
     # on the surface at the start of the step and moving or pulled in: no time passes
-    now = (left.gap <= 0) & moves_in(left, rounding) & (h == 0)
+    now = (left.gap <= 0) & moves_in(left, rounding, own) & (h == 0)
     # a polynomial whose error is comparable with the gap is uninformative; if the gap
     # has been closed so far, its value is itself only rounding
     size = jnp.maximum(scale, jnp.maximum(jnp.abs(left.gap), jnp.abs(right.gap)))
@@ -109,17 +112,30 @@ def judge(
     return StepVerdict(retake, length, lands, offset, jnp.zeros_like(h))
 
 
-def moves_in(jet: Jet, rounding):
+def moves_in(jet: Jet, rounding, longest=None):
     """Return whether the motion enters, or is accelerated into, the constraint.
 
     If the parabola through the jet turns back before the penetration exceeds the
-    rounding error, the motion only touches the constraint.
+    rounding error, the motion only touches the constraint. Friction may hold a body at
+    rest at a constraint, and the body leaves it under a force that grows from zero. If
+    the `longest` step is given, the same therefore holds for a motion that the jerk
+    turns back, or that is hidden by the rounding error during this step.
     """
     touches = (jet.acceleration > 0) & (
         2 * jet.acceleration * (jet.gap + rounding) > jet.velocity**2
     )
     falls = (jet.velocity < 0) & ~touches
-    return falls | ((jet.velocity == 0) & (jet.acceleration < 0))
+    enters = falls | ((jet.velocity == 0) & (jet.acceleration < 0))
+    if longest is None:
+        return enters
+    v, a, j = -jet.velocity, jnp.maximum(-jet.acceleration, 0.0), jet.jerk
+    # distances due to the velocity alone, and due to the acceleration alone
+    room = (jet.gap + rounding) / 8
+    turned = (8 * v * v * v <= 9 * j * room * room) & (
+        2 * a * a * a <= 3 * j * j * room
+    )
+    still = (v * longest <= room) & (a * longest * longest <= room)
+    return enters & ~((room > 0) & ((turned & (j > 0)) | still))
 
 
 def earliest(verdicts: list[StepVerdict]) -> StepVerdict:

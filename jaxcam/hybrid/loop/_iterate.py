@@ -77,7 +77,7 @@ def _iterate(
     active = carried.status == RUNNING
     sticking = any_of(carried.contact)
     rounding = [1e-15 * s + b for s, b in zip(carried.sizes, carried.blur, strict=True)]
-    end = end_of_step(plan, carried, rounding)
+    end = end_of_step(functions, plan, carried, rounding)
     made = make_step(functions, plan, carried, end)
     if carried.stale:
         carried, made = refreshed(carried, made)
@@ -208,6 +208,7 @@ def _judge_flights(
             end.room,
             carried.longest,
             calm=functions.counts is not None and k + 1 == len(jets),
+            held=k < functions.m and bool(functions.slidable),
             where=functions.where,
         )
 
@@ -318,8 +319,10 @@ def _next_jets(carried, jets, landing: Landing, went, pressing, delay):
         )
     if carried.stale:
         same = of_constraints(carried, carried.jets, after)
+        rest = [landing.strikes] * (len(after) - len(went))
+        fresh = [*(landing.strikes | one for one in went), *rest]
         after = [
-            Jet(*select(landing.strikes, new, old)) for new, old in zip(after, same)
+            Jet(*select(now, new, old)) for now, new, old in zip(fresh, after, same)
         ]
     return tuple(after)
 

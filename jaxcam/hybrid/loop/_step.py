@@ -49,16 +49,25 @@ class Step(NamedTuple):
     scale: tuple
 
 
-def end_of_step(plan: Plan, carried: LoopState, rounding) -> StepEnd:
+def end_of_step(
+    functions: Functions, plan: Plan, carried: LoopState, rounding
+) -> StepEnd:
     """Choose where the next step ends; `rounding` is the resolution of a gap."""
     asked = jnp.minimum(plan.t0 + (carried.stops + 1) * plan.stop_period, plan.t1)
     sides = neighbours(plan.breaks, plan.repeat, carried.t)
     stop = jnp.minimum(asked, sides[1])
+    m, longest = len(carried.held), carried.longest if functions.slidable else None
     # on the surface and moving in, or in contact and pulled away: no time passes
     now = any_of(
         [
-            jnp.where(c, j.acceleration > 0, (j.gap <= 0) & moves_in(j, near))
-            for j, c, near in zip(carried.jets, carried.closed, rounding, strict=True)
+            jnp.where(
+                c,
+                j.acceleration > 0,
+                (j.gap <= 0) & moves_in(j, near, longest if k < m else None),
+            )
+            for k, (j, c, near) in enumerate(
+                zip(carried.jets, carried.closed, rounding, strict=True)
+            )
         ]
     )
     if carried.crossed:
