@@ -236,6 +236,9 @@ def _sequence(*kinds):
         ),
         (["cross", "slide", "leave"], ["slide", "leave", "cross"], None),
         (["impact"], ["stick", "release"], "change of events"),
+        # sliding that begins just before an impact ends it, or long before
+        (["cross", "impact"], ["cross", "slide", 1e-5, "impact"], "corner collision"),
+        (["cross", "impact"], ["cross", "slide", "impact"], "change of events"),
     ],
 )
 def test_names_of_changes(before, after, name):
@@ -308,3 +311,56 @@ def test_an_orbit_through_the_corner_of_two_surfaces_is_located():
     # at a smaller amplitude, the threshold of the velocity is not reached
     others = [p.parameter for p in found.special if p.kind == "grazing"]
     np.testing.assert_allclose(others, [gain * 0.6 / omega], atol=1e-8)
+
+
+class Capsule(SwitchedSystem):
+    """A capsule with dry friction on the ground, driven by a mass that strikes a stop
+    inside (Y. Liu et al., Int. J. Mech. Sci. 66 (2013)): relative position of the mass,
+    its velocity, and that of the capsule.
+    """
+
+    state_names = ("relative", "mass", "capsule")
+    friction: float = 0.8
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / 1.1
+
+    def switching(self, t, state):
+        return state[2]
+
+    def branch(self, t, state, sides):
+        spring = state[0] + 0.1 * (state[1] - state[2])
+        push = 1.6 * jnp.cos(1.1 * t) - spring
+        ground = (spring - self.friction * sides[0]) / 2.0
+        return jnp.stack([state[1] - state[2], push, ground])
+
+    def gap(self, t, state):
+        return 0.2 - state[0]
+
+    def impact(self, t, state):
+        push = 1.6 * (state[1] - state[2]) / 3.0
+        return jnp.stack([state[0], state[1] - 2.0 * push, state[2] + push])
+
+
+@pytest.mark.slow
+def test_changes_of_a_capsule_that_sticks_at_the_start_of_the_period():
+    """The velocity at the start is zero to rounding. The capsule slips between two
+    sticking phases up to the first friction, and an impact ends its slip before it
+    would stick at the second: simulations on both sides of each have these events.
+    """
+    for bounds, kind, before, after in [
+        ((2.1, 2.2), "adding-sliding", 2, 1),
+        ((0.28, 0.32), "corner collision", 1, 0),
+    ]:
+        system = Capsule(bounds[0])
+        orbit = continuation.periodic_orbit(system)
+        found = continuation.branch(system, orbit, "friction", bounds)
+        assert [point.kind for point in found.special] == [kind]
+        at = found.special[0].parameter
+        name = "slide" if kind == "adding-sliding" else "leave"
+        numbers = []
+        for one in (at - 1e-3, at + 1e-3):
+            there = continuation.periodic_orbit(Capsule(one), orbit.state)
+            numbers.append(sum(event.kind == name for event in there.signature))
+        assert numbers == [before, after]

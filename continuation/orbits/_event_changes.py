@@ -21,8 +21,12 @@ CHANGE = "change of events"
 # errors
 _SYMMETRIC = 1e-4
 
+# Events at a constraint and at a surface coincide if the time between them is between
+# these fractions of the longest interval between events; below, they are one event
+_AT_ONCE, _CLOSE = 1e-12, 1e-3
+
 _MODE = ("contacts", "sides", "sliding")
-_COUNTED = ("impacts", "contacts", "crossings", "slides")
+_COUNTED = ("impacts", "contacts", "crossings", "slides", "leaves")
 _ORDER = "order of events"
 
 
@@ -118,8 +122,9 @@ def name_of_change(
     - `"crossing-sliding"`: a crossing of a surface becomes sliding along it.
     - `"switching-sliding"`: it crosses a surface before it slides there.
     - `"adding-sliding"`: it leaves the surface for a moment during sliding.
-    - `"corner collision"`: two events at different constraints or surfaces exchange
-      their order; the orbit passes through the intersection of both.
+    - `"corner collision"`: two events at different constraints or surfaces coincide, so
+      that their order or their kind changes; the orbit passes through the intersection
+      of both.
 
     (M. di Bernardo, P. Kowalczyk, A. Nordmark, Bifurcations of dynamical systems with
     sliding, Physica D 170 (2002))
@@ -144,6 +149,8 @@ def name_of_change(
         return "corner collision"
     if change == {"slide": 1, "leave": 1}:
         return "grazing-sliding" if _briefest(after) == "slide" else "adding-sliding"
+    if _coincide(before) or _coincide(after):
+        return "corner collision"
     return CHANGE
 
 
@@ -169,6 +176,21 @@ def _exchanged(first: list[Event], second: list[Event]) -> bool:
         if _rotated(swapped, second):
             return True
     return False
+
+
+def _coincide(events: list[tuple[float, Event]]) -> bool:
+    """Return whether an event at a surface is very close to an event at a constraint.
+
+    An impact that moves the state across a surface is a single event.
+    """
+    pairs = list(zip(events[:-1], events[1:], strict=True))
+    gaps = [later - time for (time, _), (later, _) in pairs]
+    longest = max(gaps, default=0.0)
+    return any(
+        _AT_ONCE * longest < gap < _CLOSE * longest
+        and _place(event)[0] != _place(other)[0]
+        for ((_, event), (_, other)), gap in zip(pairs, gaps, strict=True)
+    )
 
 
 def _place(event: Event) -> tuple[bool, int]:

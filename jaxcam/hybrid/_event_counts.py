@@ -23,6 +23,9 @@ class EventCounts(eqx.Module):
     """Number of crossings of switching surfaces."""
     slides: Float[Array, ""]
     """Number of times that sliding begins."""
+    leaves: Float[Array, ""]
+    """Number of times that a motion leaves a surface along which it slid, other than by
+    an impact."""
     recent: Float[Array, ""]
     """Number of impacts since the last event of another kind."""
     order: Float[Array, ""]
@@ -32,7 +35,7 @@ class EventCounts(eqx.Module):
     @staticmethod
     def zero() -> "EventCounts":
         """Return the numbers at the start of a motion, all zero; the sign is 1."""
-        return EventCounts(*(jnp.zeros(()) for _ in range(5)), order=jnp.ones(()))
+        return EventCounts(*(jnp.zeros(()) for _ in range(6)), order=jnp.ones(()))
 
     @staticmethod
     def of(
@@ -54,6 +57,7 @@ class EventCounts(eqx.Module):
             np.sum(completes),
             np.sum(events == float(RowKind.SWITCH)),
             np.sum(events == float(RowKind.SLIDE)),
+            np.sum(events == float(RowKind.LEAVE)),
             recent[-1],
             _sign_of(places[_lasting(recent[:-1], completes)]),
         )
@@ -72,6 +76,7 @@ class EventCounts(eqx.Module):
             contacts=self.contacts + completes,
             crossings=self.crossings + one_if(RowKind.SWITCH),
             slides=self.slides + one_if(RowKind.SLIDE),
+            leaves=self.leaves + one_if(RowKind.LEAVE),
             recent=jnp.where(hits > 0, self.recent + 1.0, recent),
             order=self.order,
         )

@@ -162,9 +162,10 @@ def first_state(
 
 
 def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
+    time = forced_time(period)
     # flags that are known now, not only in the program, make it shorter
     m, free = functions.m, (np.bool_(False),) * functions.m
-    sides, crossings, slides, stuck = first_sides(functions, t0, x, free)
+    sides, crossings, slides, stuck = first_sides(functions, t0, x, free, time)
     free = free + sides
     jets = functions.jets(t0, x, free)[:m] if m else []
     # only used without contact
@@ -172,7 +173,6 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     lifts, left = functions.lift(t0, x, free)
     whole = functions.blur(t0, x, (0.0,) * functions.n, free)
     blurs = whole[:m], functions.speed_blur(t0, x, free)
-    time = forced_time(period)
     tinies, slows = (
         [start_room(b, j.acceleration, s) for b, j in zip(each, jets, strict=True)]
         for each, s in zip(blurs, (time * time, time), strict=True)
@@ -214,7 +214,7 @@ def _first_state(functions: Functions, t0, x, t1, longest, period) -> LoopState:
     ]
     if m and functions.slidable:
         # contact forces and their friction may also hold the motion on a surface
-        found = first_sides(functions, t0, x, tuple(contact))
+        found = first_sides(functions, t0, x, tuple(contact), time)
         sides, crossings, slides, stuck = found
         status = jnp.where((status == RUNNING) & stuck, ACCUMULATES, status)
     longest = jnp.minimum((t1 - t0) / 64, longest)

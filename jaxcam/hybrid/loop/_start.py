@@ -7,7 +7,6 @@ from ..codes import BACKWARD, BEHIND, NOT_FINITE, RUNNING
 from ..surface import gaps, least_gaps
 from ._flight import moves_in
 from ._functions import Functions
-from ._gap_polynomial import Jet
 from ._select import any_of
 
 
@@ -29,11 +28,18 @@ def first_status(t0, x, t1, gaps, rooms):
     return jnp.where(t1 < t0, BACKWARD, status)
 
 
-def first_sides(functions: Functions, t, x, contact):
+# a distance from a surface that the motion covers in this fraction of the period of the
+# forcing over 2 pi is zero
+_AT_ONCE = 1e-12
+
+
+def first_sides(functions: Functions, t, x, contact, time):
     """Return the sides of the switching surfaces on which a motion starts.
 
     A motion that starts on a surface enters one of its sides, or slides along it. If
-    both branches leave the surface, the system determines the side.
+    both branches leave the surface, the system determines the side. For a velocity of
+    zero, the forced motion provides the only scale: `time` is the period of the forcing
+    over 2 pi (s), or zero.
 
     Returns:
         Flags of the negative sides, then of sliding; the jets of the surfaces there, as
@@ -53,8 +59,16 @@ def first_sides(functions: Functions, t, x, contact):
         """
         mode = (*contact, *sides[:k], flag, *sides[k + 1 :], *free)
         jets, roundings = functions.open_surfaces(t, x, mode)
-        jet, on = _rounded(jets[k], roundings[k])
+        jet, on = rounded(k, jets[k], roundings[k])
         return jet, on, on & moves_in(jet, roundings[k])
+
+    def rounded(k, jet, rounding):
+        """Return a jet without the rounding error of a distance of zero, and whether it
+        is zero.
+        """
+        slow = _AT_ONCE * time * jnp.abs(jet.velocity)
+        on = jnp.abs(jet.gap) <= rounding + (slow if k in functions.slidable else 0.0)
+        return jet._replace(gap=jnp.where(on, 0.0, jet.gap)), on
 
     for k in range(functions.one_way):
         crossed = [jnp.asarray(False)] * functions.k
@@ -78,16 +92,9 @@ def first_sides(functions: Functions, t, x, contact):
         sides[k] = flag ^ (leaves & ~back)
     sides, slides = _held_together(functions, t, x, contact, sides, touched, slides)
     jets, roundings = functions.open_surfaces(t, x, (*contact, *sides, *free))
-    jets = [_rounded(*pair)[0] for pair in zip(jets, roundings, strict=True)]
+    pairs = enumerate(zip(jets, roundings, strict=True))
+    jets = [rounded(k, *pair)[0] for k, pair in pairs]
     return (*sides, *slides), jets, any_of(slides), stuck
-
-
-def _rounded(jet: Jet, rounding):
-    """Return a jet without the rounding error of a distance of zero, and whether it is
-    zero.
-    """
-    on = jnp.abs(jet.gap) <= rounding
-    return jet._replace(gap=jnp.where(on, 0.0, jet.gap)), on
 
 
 def _held_together(functions: Functions, t, x, contact, sides, touched, slides):
