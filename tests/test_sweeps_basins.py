@@ -106,7 +106,7 @@ def test_labels_do_not_depend_on_order_or_blocks(coexisting):
     states = GRID.states()
     order = rng.permutation(len(states))
     samples, labels = settle(SECTION, states[order], 200, 24, reruns=5)
-    origin, scale = np.array(GRID.low), default_scale(GRID)
+    origin, scale = np.array(GRID.low), default_scale(SECTION, GRID, 200, 24)
     prints = fingerprints(samples.states, labels.turns, origin, scale)
     (odd,) = np.nonzero(labels.turns == 0)
     cells = cell_codes(samples.states[odd], origin, scale, 1 / 64)
@@ -118,6 +118,18 @@ def test_labels_do_not_depend_on_order_or_blocks(coexisting):
         found = basins(SECTION, GRID, **OPTIONS, block=block, workers=workers)
         assert np.array_equal(found.attractor, coexisting.attractor)
         assert np.array_equal(found.orbits, coexisting.orbits, equal_nan=True)
+
+
+def test_a_component_with_a_single_cell_has_the_scale_of_the_motion():
+    """A rotation takes x to y / 100, but the only cell of y is 0.001 wide."""
+
+    def rotated(x, p):
+        return jnp.stack([100.0 * x[1], -x[0] / 100.0])
+
+    section = Map(rotated, None)
+    one, two = (Grid((-1.0, 0.0), (3.0, 1e-3), (4, count)) for count in (1, 2))
+    assert default_scale(section, one, 1, 8).tolist() == [4.0, 0.01]
+    assert default_scale(section, two, 1, 8).tolist() == [4.0, 1e-3]
 
 
 def test_lanes_advance_alike_in_any_company():

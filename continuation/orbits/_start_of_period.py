@@ -1,44 +1,53 @@
-"""Move the start of the period of an orbit away from its impacts.
+"""Move the start of the period of an orbit away from its impacts and contacts.
 
-The state jumps at an impact, so an orbit cannot be followed while an impact passes
-through the start of its period.
+The state jumps at an impact, and the number of independent state components changes at
+the beginning and at the end of a contact. An orbit cannot be followed while such an
+event, or a transition between named modes, passes through the start of its period.
 """
 
 from typing import Any
 
 import numpy as np
 
-from jaxcam.hybrid import simulate
+from jaxcam.hybrid import simulate, SwitchedSystem, Trajectory
 
 from .._parameter import as_jax, with_leaf
 from .._point import with_field
 
 
-# an impact is close to the start if the time between them is less than this fraction of
+# an event is close to the start if the time between them is less than this fraction of
 # the duration of the orbit
 _CLOSE = 0.01
 
 
 def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | None):
     """Return the problem with a later start of the period, the unknowns there, and
-    their difference from those of the point before; None if no impact is close to the
-    start.
+    their difference from those of the point before; None if the start need not, or
+    cannot, be moved.
 
     `problem` is a `SingleShooting` of a system with forcing.
     """
-    run = _run(problem, leaf, z)
-    if run is None:
+    found = _run(problem, leaf, z)
+    if found is None:
         return None
-    start, end = run[1:]
-    run, length = run[0], end - start
-    hits = (np.asarray(run.impacts.time)[: int(run.impacts.count)] - start) / length
-    if not np.any(np.minimum(hits, 1 - hits) < _CLOSE):
+    run, start, end = found
+    length = end - start
+    events = (_obstacles(run) - start) / length
+    if not np.any(np.minimum(events, 1 - events) < _CLOSE):
         return None
-    switches: Any = run.switches
-    turned = np.asarray(switches.time)[: int(switches.count)]
-    marks = np.sort(np.concatenate([[0.0, 1.0], hits, (turned - start) / length]))
-    longest = int(np.argmax(np.diff(marks)))
-    share = float(marks[longest : longest + 2].mean())
+    turned = (np.asarray(_first(run.switches, "time")) - start) / length
+    marks = np.sort(np.concatenate([[0.0, 1.0], events, turned]))
+    middles, widths = (marks[:-1] + marks[1:]) / 2, np.diff(marks)
+    share = next(
+        (
+            float(middles[k])
+            for k in np.argsort(-widths)
+            if widths[k] > 2 * _CLOSE and _may_start(run, start + middles[k] * length)
+        ),
+        None,
+    )
+    if share is None:
+        return None
     later = share * problem.periods
     moved = with_field(problem, "shift", np.asarray(float(problem.shift) + later))
     there = _at(run, start + share * length, z)
@@ -49,6 +58,40 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
         return moved, there, None
     run, start, end = earlier
     return moved, there, there - _at(run, start + share * (end - start), before)
+
+
+def _first(events: Any, name: str):
+    """Return a column of a table of events, without empty rows."""
+    return np.asarray(getattr(events, name))[: int(events.count)]
+
+
+def _obstacles(run: Trajectory) -> np.ndarray:
+    """Return the times (s) of events that cannot pass through the start."""
+    times = [_first(run.impacts, "time")]
+    times += [_first(run.contacts, name) for name in ("start", "end")]
+    system = run.system
+    if isinstance(system, SwitchedSystem):
+        which = _first(run.switches, "surface")
+        times.append(_first(run.switches, "time")[which < system.one_way])
+    return np.concatenate(times)
+
+
+def _may_start(run: Trajectory, time: float) -> bool:
+    """Return whether a simulation that starts at a time (s) is in the same mode as this
+    one, and without contact.
+    """
+    steps = run.steps
+    passed = np.asarray(steps.time)[: int(steps.count)]
+    row = int(np.searchsorted(passed, time, side="right")) - 1
+    if np.any(np.asarray(steps.contact)[row]):
+        return False
+    system = run.system
+    if not (isinstance(system, SwitchedSystem) and system.remembers):
+        return True
+    state = run.at(np.array([time]))[0]
+    sides = np.asarray(system.sides(time, state))
+    present = np.asarray(steps.sides)[row]
+    return bool(np.all((present == 0) | (present == sides)))
 
 
 def sampled(problem: Any, observed: dict[str, Any], u: np.ndarray) -> dict[str, Any]:

@@ -51,7 +51,8 @@ def basins(
         reruns: Number of extensions of non-periodic runs, each twice as long as the
             previous one.
         scale: Scale of the motions, shape `(n,)`; default: the largest extent or
-            coordinate of the grid, or the scale of `known`. The scale matters if the
+            coordinate of the grid (for a component with a single cell, also of a
+            motion), or the scale of `known`. The scale matters if the
             grid is small compared with the attractors.
         known: Basins of the same system whose attractor numbers are to be kept, for
             example when zooming in.
@@ -85,7 +86,11 @@ def basins(
     if block is not None and block < 1:
         raise ValueError(f"block is {block}; give 1 or more rows of the grid")
     if scale is None:
-        scale = known.scale if known is not None else default_scale(grid)
+        scale = (
+            known.scale
+            if known is not None
+            else default_scale(section, grid, turns, keep)
+        )
     scale = np.asarray(scale, dtype=float)
     if scale.shape != (len(grid.shape),) or not np.all(scale > 0):
         raise ValueError(

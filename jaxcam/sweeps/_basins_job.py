@@ -75,10 +75,24 @@ class BasinsJob(AbstractJob):
         )
 
 
-def default_scale(grid: Grid) -> np.ndarray:
-    """Return the largest extent or coordinate of the grid in each component."""
-    low, high = np.abs(grid.low), np.abs(grid.high)
-    found = np.maximum(grid.extents, np.maximum(low, high))
+def default_scale(
+    section: AbstractSection, grid: Grid, turns: int, keep: int
+) -> np.ndarray:
+    """Return the largest extent or coordinate of the grid in each component.
+
+    For a component with a single cell, the largest value in a motion from the middle of
+    the grid also counts.
+    """
+    low, high = np.array(grid.low), np.array(grid.high)
+    found = np.maximum(grid.extents, np.maximum(np.abs(low), np.abs(high)))
+    single = np.array(grid.shape) == 1
+    if np.any(single):
+        samples, _ = settle(section, (low + high)[None] / 2, turns, keep)
+        states = np.abs(samples.states).reshape(-1, len(found))
+        reach = np.max(np.where(np.isfinite(states), states, 0.0), axis=0)
+        # rounded, because the scale is part of the identity of a stored sweep
+        reach = np.array([float(f"{one:.1e}") for one in reach])
+        found = np.where(single, np.maximum(found, reach), found)
     return np.where(found > 0, found, 1.0)
 
 
