@@ -20,7 +20,7 @@ from jaxcam.discrepancy.search._hidden_signals import driven_by
 from jaxcam.discrepancy.search._hidden_state import Hidden, with_hidden
 from jaxcam.discrepancy.search._local_force import force_response
 from jaxcam.discrepancy.search._state_elimination import StateElimination
-from jaxcam.discrepancy.search._vibration_scan import periodogram
+from jaxcam.discrepancy.search._vibration_scan import Periodogram, periodogram
 from jaxcam.discrepancy.terms import HiddenForce, WithTerms
 from jaxcam.discrepancy.terms._library import ExternalVibration
 from jaxcam.discrepancy.terms._shapes import ForceOfTime, ForceOfVelocity
@@ -246,3 +246,11 @@ def test_states_are_eliminated_as_from_the_whole_matrix():
     inner, side = whole[: 2 * n, : 2 * n], whole[: 2 * n, rest]
     left = whole[rest, rest] - side[:, :-1].T @ np.linalg.solve(inner, side)
     assert known == pytest.approx(left, rel=1e-9, abs=1e-9)
+
+
+def test_a_gain_that_falls_from_the_lowest_frequency_is_no_peak():
+    """Of a slow change and a weaker vibration, the vibration is the peak."""
+    frequency, falling = np.arange(1.0, 7.0), np.array([9.0, 7.0, 3.0, 2.0, 5.0, 4.0])
+    scan = Periodogram(frequency, falling, falling[::-1], 2)
+    assert scan.best == (5.0, 5.0)
+    assert scan.best_separate == (6.0, 9.0)

@@ -184,6 +184,15 @@ def test_time_must_increase(tmp_path):
     assert "time does not increase" in refusal(written(tmp_path, text(table)))
 
 
+def test_rounded_times_are_said_to_be_rounded(tmp_path):
+    """Times in hundredths of a second at 150 samples per second."""
+    table = columns()
+    number = len(table["time_s"])
+    table["time_s"] = np.round(np.arange(number) / 150.0, 2)
+    sentence = refusal(written(tmp_path, text(table)))
+    assert "seem to be rounded" in sentence and "--rate 149.6" in sentence
+
+
 def test_other_units_than_the_name_says(tmp_path):
     table = columns()
     degrees = {**table, "follower_angle_rad": np.degrees(table["follower_angle_rad"])}

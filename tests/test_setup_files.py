@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, HealthCheck, settings, strategies as st
 
 from jaxcam.fitting import Input, is_setup, Problem, read_setup, Turning
+from jaxcam.fitting._repeated_samples import repeats_noted
 from jaxcam.fitting.engine import DriveState
 from jaxcam.fitting.own_systems import (
     classes_beside,
@@ -193,7 +194,7 @@ def test_a_drive_may_have_an_offset_that_is_fitted(tmp_path):
         ("cart.py:Cart", "cart.py:Card", "no class `Card` in it; is `Cart` meant?"),
         ("cart.py:Cart", "cart.py:Wheel", "its systems are Cart"),
         ("cart.py:Cart", "cart.py:jnp", "is not a HybridSystem"),
-        ("cart.py:Cart", "cart.py:HybridSystem", "`HybridSystem` has no `gap`"),
+        ("cart.py:Cart", "cart.py:HybridSystem", "`HybridSystem` has no `vector_field`"),
         ("[parameters]", "[parameter]", "is `parameters` meant?"),
         (
             "stiffness",
@@ -387,3 +388,21 @@ def test_a_sensor_that_shows_no_motion_is_refused(tmp_path, steps):
     run = Recording("still", time, {"position_m": still})
     with pytest.raises(RecordingError, match="still: the channel `position_m` is 0.01"):
         setup.segments([run])
+
+
+def _moving(samples):
+    return Recording("run", np.arange(len(samples)) / 100.0, {"x_m": samples})
+
+
+def test_stale_samples_in_fast_motion_are_noted():
+    """Every value twice: half of the samples repeat the one before. Samples that are
+    rounded, that rest, or that jump now and then do not.
+    """
+    time = np.arange(400) / 100.0
+    swing = np.round(np.sin(4 * time), 3)
+    stale = _moving(np.repeat(swing[::2], 2))
+    (note,) = repeats_noted(stale, ["x_m"]).meta["notes"]
+    assert "% of the samples of `x_m` repeat the one before" in note
+    steps = np.repeat([0.0, 1.0, 3.0, 2.0], 100)
+    for samples in (swing, np.round(0.01 * swing, 3), steps):
+        assert "notes" not in repeats_noted(_moving(samples), ["x_m"]).meta

@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 
 from ..discrepancy import Diagnosis, library, Verdict
+from ..discrepancy.evidence import Structure
 from ..discrepancy.report import listed, number, spelled
 from ..tables import scaled
 from ._changed import changed
@@ -199,7 +200,7 @@ def _left_over(found: Diagnosis) -> list[str]:
             one.where,
             f"{one.gain:.1f}",
             f"{one.threshold:.1f}",
-            "yes" if one.significant else "no",
+            _significance(one),
         )
         for one in found.left_after
     ]
@@ -209,11 +210,20 @@ def _left_over(found: Diagnosis) -> list[str]:
     headings = ("free function", "where", "gain", "threshold", "significant")
     return [
         "<h2>Remaining structure in the residuals</h2>",
-        table_html(headings, rows, text=(0, 1)),
+        table_html(headings, rows, text=(0, 1, 4)),
         '<p class="note">The gain is the predicted increase in twice the '
         "log-likelihood if the free function is added to the model. The threshold "
         "follows from the false-alarm rate and the number of coefficients.</p>",
     ]
+
+
+def _significance(one: Structure) -> str:
+    """Say whether a correction is significant; if not, although its gain exceeds the
+    threshold, give the reason.
+    """
+    if one.significant:
+        return "yes"
+    return "no: differs between recordings" if one.gain > one.threshold else "no"
 
 
 def _parameters(found: Diagnosis) -> list[str]:

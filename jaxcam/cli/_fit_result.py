@@ -12,6 +12,7 @@ from ..discrepancy import Policy
 from ..recordings import Recording, Rig, segment_case, Segments
 from ..tables import counted
 from ._fit_report import correlation_table, nominal_value, parameter_table
+from ._found_impacts import found_impacts
 from ._impact_laws import impact_laws
 from ._output import Output
 from ._saved_system import as_saved
@@ -256,8 +257,9 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
 
     If a fit failed, the reason goes to standard error instead.
     """
-    doubts = (found.doubted,) if found.doubted else ()
-    for sentence in (*notes, *doubts, *found.seen.sentences()):
+    events = found_impacts(found.segments, found.problem.model.system)
+    said = [sentence for sentence in (events, found.doubted) if sentence]
+    for sentence in (*notes, *said, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))
     if len(found.after.estimates) > 1:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 
 # Correlation below which knowing one parameter hardly helps to determine another
-_WEAK = 0.1
+_WEAK = 0.3
 
 
 @dataclasses.dataclass(frozen=True)

@@ -174,7 +174,8 @@ def identify(
     if not np.all(np.isfinite(information)):
         raise ValueError(
             "The sensitivities of the model to its parameters are not finite; check "
-            "its vector field, gap and impact at the nominal parameters for NaN."
+            "the units of the columns and the nominal parameters, and for NaN in the "
+            "vector field, gap and impact."
         )
     values, vectors = np.linalg.eigh(information)
     # eigenvalues that are zero to within rounding are set to zero

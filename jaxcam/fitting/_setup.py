@@ -14,6 +14,7 @@ from ..recordings import read_case, Recording, RecordingError, Segments
 from ..recordings.files import Case, FileLayout
 from ._contact_in_doubt import contact_in_doubt
 from ._lags import without_lags
+from ._repeated_samples import repeats_noted
 from ._segment_by_model import segment_by_model
 from .engine import Input, Model, Parameter, Problem
 
@@ -89,7 +90,7 @@ class Setup:
 
     def known_of(self, case: Case, *, picked: bool = False) -> Case:
         """Return the case with the constants that the rig file gives for each
-        recording.
+        recording, and with notes on channels that repeat samples in fast motion.
 
         Args:
             case: The case.
@@ -100,7 +101,9 @@ class Setup:
         Raises:
             RecordingError: Constants belong to a recording that does not exist.
         """
-        runs, notes = tuple(self._with_known(run) for run in case), []
+        sensors = self.model.sensors
+        runs = tuple(repeats_noted(self._with_known(run), sensors) for run in case)
+        notes: list[str] = []
         for pattern in self.records:
             if any(_fits(run.name, pattern) for run in case):
                 continue

@@ -133,8 +133,9 @@ def check_runs(runs: Sequence[Recording | Segments]) -> None:
     """Refuse a single recording, and recordings of the same name."""
     if len(runs) < 2:
         raise RecordingError(
-            f"There is only {len(runs)} recording; give at least two of the same rig "
-            "at different speeds, so that one can be predicted from the other."
+            f"There is only {len(runs)} recording; give at least two of the same rig, "
+            "so that one can be predicted from the other. A long recording may be "
+            "divided into several files."
         )
     names = [r.recording.name if isinstance(r, Segments) else r.name for r in runs]
     repeated = [name for name, count in Counter(names).items() if count > 1]

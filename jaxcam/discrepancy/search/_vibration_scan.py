@@ -44,14 +44,25 @@ class Periodogram:
     @property
     def best(self) -> tuple[float, float]:
         """Frequency (Hz) and gain of the highest peak with one phase."""
-        k = int(np.argmax(self.gain))
+        k = _highest(self.gain)
         return float(self.frequency[k]), float(self.gain[k])
 
     @property
     def best_separate(self) -> tuple[float, float]:
         """Frequency (Hz) and gain of the highest peak with separate phases."""
-        k = int(np.argmax(self.separate))
+        k = _highest(self.separate)
         return float(self.frequency[k]), float(self.separate[k])
+
+
+def _highest(gain: Float[np.ndarray, " k"]) -> int:
+    """Return the index of the highest peak.
+
+    A gain that only falls from the lowest frequency on belongs to a slower change,
+    which is not a vibration.
+    """
+    falls = np.diff(gain) <= 0
+    first = len(gain) - 1 if np.all(falls) else int(np.argmin(falls))
+    return first + int(np.argmax(gain[first:]))
 
 
 def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodogram:
@@ -81,7 +92,7 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     whole = tuple(sum(part) for part in zip(*parts))
     gain = _gain(inside, score, [whole])
     separate = _gain(inside, score, parts)
-    top = [int(np.argmax(separate))]
+    top = [_highest(separate)]
     peak = [tuple(one[..., top] for one in part) for part in parts]
     rest = [_gain(inside, score, peak[:r] + peak[r + 1 :])[0] for r in range(len(peak))]
     elsewhere = min(rest) if len(peak) > 1 else 0.0

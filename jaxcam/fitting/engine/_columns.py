@@ -199,7 +199,8 @@ def invert_information(
     if not np.all(np.isfinite(information)):
         raise ValueError(
             "The sensitivities of the model to its parameters are not finite; check "
-            "its vector field, gap and impact at the fitted states for NaN."
+            "the units of the columns, and for NaN in the vector field, gap and impact "
+            "at the fitted states."
         )
     diagonal = np.diag(information)
     dead = ~(diagonal > 0)

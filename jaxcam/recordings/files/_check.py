@@ -13,6 +13,9 @@ _SPEED_TOLERANCE = 0.05
 # Largest follower angle (rad): the follower stays below the vertical, and values in
 # degrees exceed this limit
 _FOLLOWER_RANGE = np.pi / 2
+# If more than this fraction of the samples have the time of the one before, the times
+# are rounded
+_ROUNDED = 0.01
 # Smallest plausible sampling interval (s), below that of any encoder or gyro
 _SHORTEST = 1e-9
 
@@ -35,6 +38,14 @@ def find_gaps(
     back = np.flatnonzero(steps <= 0)
     if len(back):
         row = int(back[0])
+        if not np.any(steps < 0) and len(back) > _ROUNDED * len(steps):
+            rate = len(steps) / float(time[-1] - time[0])
+            raise RecordingError(
+                f"{name}: {len(back)} samples have the same time as the one before, so "
+                f"the times seem to be rounded. If the samples are equidistant, leave "
+                f"the time column out (--columns=-,NAME,..., with `-` for the time) "
+                f"and give the sampling rate (--rate {rate:.6g})."
+            )
         raise RecordingError(
             f"{name}: time does not increase from row {row + 1} ({time[row]:.10g} s) "
             f"to row {row + 2} ({time[row + 1]:.10g} s); sort the rows, or keep one of "
