@@ -194,7 +194,11 @@ def test_a_drive_may_have_an_offset_that_is_fitted(tmp_path):
         ("cart.py:Cart", "cart.py:Card", "no class `Card` in it; is `Cart` meant?"),
         ("cart.py:Cart", "cart.py:Wheel", "its systems are Cart"),
         ("cart.py:Cart", "cart.py:jnp", "is not a HybridSystem"),
-        ("cart.py:Cart", "cart.py:HybridSystem", "`HybridSystem` has no `vector_field`"),
+        (
+            "cart.py:Cart",
+            "cart.py:HybridSystem",
+            "`HybridSystem` has no `vector_field`",
+        ),
         ("[parameters]", "[parameter]", "is `parameters` meant?"),
         (
             "stiffness",

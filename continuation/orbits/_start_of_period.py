@@ -42,7 +42,8 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
         (
             float(middles[k])
             for k in np.argsort(-widths)
-            if widths[k] > 2 * _CLOSE and _may_start(run, start + middles[k] * length)
+            if widths[k] > 2 * _CLOSE
+            and _may_start(run, float(start + middles[k] * length))
         ),
         None,
     )
