@@ -59,6 +59,24 @@ def test_the_stick_slip_cycle_has_its_period_and_multipliers():
     np.testing.assert_allclose(np.sort(np.abs(again)), found, atol=1e-12)
 
 
+def test_an_orbit_that_is_traversed_twice_has_equal_halves():
+    """To 1e-8; the halves of the cycle itself differ by half its size. Orbits that
+    repeat after an odd number of forcing periods have no halves to compare.
+    """
+    orbit = belt_cycle()
+    start = continuation.SingleShooting.of(Belt(), orbit, 0, EXACT)
+    half_away = start.problem.representation.half_away
+    twice = np.append(start.state[:-1], 2 * start.state[-1])
+    once = half_away(start.state, Belt())
+    assert once is not None and once > 0.5
+    assert half_away(twice, Belt()) < 1e-8
+    forced = continuation.SingleShooting.of(
+        BilinearOscillator(), belt_cycle(), 1, EXACT
+    )
+    representation = forced.problem.representation
+    assert representation.half_away(forced.state, BilinearOscillator()) is None
+
+
 @pytest.mark.slow
 def test_a_branch_of_stick_slip_cycles_has_the_period_of_the_closed_form():
     """From a belt speed of 0.3 to 0.6, all periods to 1e-8."""

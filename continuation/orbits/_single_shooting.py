@@ -21,7 +21,6 @@ from .._parameter import as_jax
 from .._point import with_field
 from .._touch import Touch
 from ..problem import AbstractProblem, Monitor, StabilityKind, Start
-from ..representation import Unique
 from ..special import FLIP, flip_direction
 from ._by_llvm import evaluated_by_llvm
 from ._event_changes import (
@@ -32,6 +31,7 @@ from ._event_changes import (
     within_symmetry,
 )
 from ._gap_grazing import touching
+from ._half_period import WithHalves
 from ._run_twice import shooting_twice
 from ._shooting_signature import family_of, numbers_in
 from ._start_of_period import moved_start, sampled
@@ -325,9 +325,9 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         return with_field(self, "passed", np.asarray(float(self.passed) + 1.0))
 
     @property
-    def representation(self) -> Unique:
+    def representation(self) -> WithHalves:
         """The representation of an orbit, regardless of the grazings passed."""
-        return Unique(family_of(self))
+        return WithHalves(family_of(self), problem=self)
 
     def refreshed(self, u, parameters) -> "SingleShooting":
         if self.periods:
