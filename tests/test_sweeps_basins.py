@@ -121,15 +121,23 @@ def test_labels_do_not_depend_on_order_or_blocks(coexisting):
 
 
 def test_a_component_with_a_single_cell_has_the_scale_of_the_motion():
-    """A rotation takes x to y / 100, but the only cell of y is 0.001 wide."""
+    """A rotation takes x to y / 100, but the only cell of y is 0.001 wide. A motion
+    that diverges has no size, and neither has one without samples to compare.
+    """
 
     def rotated(x, p):
         return jnp.stack([100.0 * x[1], -x[0] / 100.0])
 
-    section = Map(rotated, None)
+    def growing(x, p):
+        return jnp.stack([0.5 * x[0], 1.2 * x[1] + 1.0])
+
     one, two = (Grid((-1.0, 0.0), (3.0, 1e-3), (4, count)) for count in (1, 2))
-    assert default_scale(section, one, 1, 8).tolist() == [4.0, 0.01]
+    section = Map(rotated, None)
+    # the largest value of y is 0.025, and 2^-5 the nearest power of two
+    assert default_scale(section, one, 1, 8).tolist() == [4.0, 2.0**-5]
     assert default_scale(section, two, 1, 8).tolist() == [4.0, 1e-3]
+    assert default_scale(section, one, 1, 1).tolist() == [4.0, 1e-3]
+    assert default_scale(Map(growing, None), one, 20, 8).tolist() == [4.0, 1e-3]
 
 
 def test_lanes_advance_alike_in_any_company():

@@ -12,6 +12,7 @@ import jaxcam
 from jaxcam.hybrid import flow, RESULTS, Settings, stroboscope, SwitchedSystem
 from jaxcam.models import (
     BilinearOscillator,
+    DryFrictionOscillator,
     GearBacklash,
     load_system,
     save_system,
@@ -297,3 +298,19 @@ def test_models_are_saved_and_read(tmp_path):
     for system in (BilinearOscillator(stiffness=3.0), GearBacklash(load=0.2)):
         save_system(system, tmp_path / "system.json")
         assert eqx.tree_equal(load_system(tmp_path / "system.json"), system)
+
+
+@pytest.mark.parametrize("place", [3.0, 0.1, 1.0])
+@pytest.mark.parametrize("velocity", [1e-13, -1e-13, 1e-15, -1e-17])
+def test_a_velocity_of_zero_may_have_a_rounding_error(place, velocity):
+    """Where the net force exceeds friction in either direction, and where the body
+    sticks: as from rest, to 1e-9. A body that sticks from the start has no event there.
+    """
+    system = DryFrictionOscillator()
+    run, known = (
+        jaxcam.simulate(system, [place, v], 0.0, 3.0) for v in (velocity, 0.0)
+    )
+    assert run.successful, run.result
+    np.testing.assert_allclose(run.final, known.final, atol=1e-9)
+    sticks = place == 1.0
+    assert not (sticks and np.any(np.asarray(run.switches.time) < 1e-9))

@@ -1,6 +1,8 @@
 """Detect changes of the sequence of events along a branch, and name them."""
 
+import math
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import jax.numpy as jnp
@@ -111,7 +113,9 @@ def _half(events: list[tuple[float, Event]], period: float):
 
 
 def name_of_change(
-    before: list[tuple[float, Event]], after: list[tuple[float, Event]]
+    before: list[tuple[float, Event]],
+    after: list[tuple[float, Event]],
+    period: float = math.inf,
 ) -> str | None:
     """Return the name of the bifurcation between two sequences of events, or None if
     they belong to the same orbit, started at another phase.
@@ -122,9 +126,9 @@ def name_of_change(
     - `"crossing-sliding"`: a crossing of a surface becomes sliding along it.
     - `"switching-sliding"`: it crosses a surface before it slides there.
     - `"adding-sliding"`: it leaves the surface for a moment during sliding.
-    - `"corner collision"`: two events at different constraints or surfaces coincide, so
-      that their order or their kind changes; the orbit passes through the intersection
-      of both.
+    - `"corner collision"`: events at different constraints or surfaces exchange their
+      order, or an event at a surface appears or disappears at an impact; the orbit
+      passes through the intersection of both.
 
     (M. di Bernardo, P. Kowalczyk, A. Nordmark, Bifurcations of dynamical systems with
     sliding, Physica D 170 (2002))
@@ -149,7 +153,7 @@ def name_of_change(
         return "corner collision"
     if change == {"slide": 1, "leave": 1}:
         return "grazing-sliding" if _briefest(after) == "slide" else "adding-sliding"
-    if _coincide(before) or _coincide(after):
+    if any(_coincide(part, change, period) for part in (before, after)):
         return "corner collision"
     return CHANGE
 
@@ -178,17 +182,23 @@ def _exchanged(first: list[Event], second: list[Event]) -> bool:
     return False
 
 
-def _coincide(events: list[tuple[float, Event]]) -> bool:
-    """Return whether an event at a surface is very close to an event at a constraint.
+def _coincide(
+    events: list[tuple[float, Event]], change: Mapping[str, int], period: float
+) -> bool:
+    """Return whether an event at a surface, of a kind whose number changes, is very
+    close to an event at a constraint.
 
-    An impact that moves the state across a surface is a single event.
+    An impact that moves the state across a surface is a single event. The time between
+    events is measured by the longest interval, or by the part of the period after them.
     """
     pairs = list(zip(events[:-1], events[1:], strict=True))
     gaps = [later - time for (time, _), (later, _) in pairs]
-    longest = max(gaps, default=0.0)
+    rest = period - sum(gaps)
+    longest = max([*gaps, rest if math.isfinite(rest) else 0.0])
     return any(
         _AT_ONCE * longest < gap < _CLOSE * longest
         and _place(event)[0] != _place(other)[0]
+        and {event.kind, other.kind} & set(change)
         for ((_, event), (_, other)), gap in zip(pairs, gaps, strict=True)
     )
 

@@ -281,7 +281,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
             return found, float(end - start)
 
         (first, length), (second, _) = events(*before), events(*after)
-        return name_of_change(*within_symmetry(first, second, length))
+        return name_of_change(*within_symmetry(first, second, length), length)
 
     def evaluated_on_host(self, leaf: int, z) -> Evaluation | None:
         return evaluated_by_llvm(self, leaf, z)

@@ -12,6 +12,8 @@ from .blocks import about_section, AbstractJob, Arrays, StoredVariable, StoreLay
 from .sections import AbstractSection
 
 
+# Number of motions that determine the scale of a component with a single cell
+_TRIED = 8
 _FINE = 1 / 64
 """Extent, in units of the scale, of the cells that distinguish non-periodic motions."""
 
@@ -80,20 +82,33 @@ def default_scale(
 ) -> np.ndarray:
     """Return the largest extent or coordinate of the grid in each component.
 
-    For a component with a single cell, the largest value in a motion from the middle of
-    the grid also counts.
+    For a component with a single cell, the largest value in a few motions from the grid
+    also counts, except in motions that diverge or rotate.
     """
-    low, high = np.array(grid.low), np.array(grid.high)
-    found = np.maximum(grid.extents, np.maximum(np.abs(low), np.abs(high)))
+    low, high = np.abs(grid.low), np.abs(grid.high)
+    found = np.maximum(grid.extents, np.maximum(low, high))
     single = np.array(grid.shape) == 1
-    if np.any(single):
-        samples, _ = settle(section, (low + high)[None] / 2, turns, keep)
-        states = np.abs(samples.states).reshape(-1, len(found))
-        reach = np.max(np.where(np.isfinite(states), states, 0.0), axis=0)
-        # rounded, because the scale is part of the identity of a stored sweep
-        reach = np.array([float(f"{one:.1e}") for one in reach])
-        found = np.where(single, np.maximum(found, reach), found)
+    if np.any(single) and keep > 1:
+        found = np.where(
+            single, np.maximum(found, _reach(section, grid, turns, keep)), found
+        )
     return np.where(found > 0, found, 1.0)
+
+
+def _reach(section: AbstractSection, grid: Grid, turns: int, keep: int) -> np.ndarray:
+    """Return the largest values in a few bounded motions, shape `(n,)`; zero if there
+    is none. They are rounded to powers of two, because they become part of the identity
+    of a stored sweep.
+    """
+    states = grid.states()
+    some = np.linspace(0, len(states) - 1, min(_TRIED, len(states))).astype(int)
+    kept = settle(section, states[some], turns, keep)[0].states
+    middles = [np.median(half, axis=1) for half in np.array_split(kept, 2, axis=1)]
+    drift = np.abs(middles[1] - middles[0])
+    bounded = np.isfinite(drift) & (drift <= np.ptp(kept, axis=1) / 2)
+    reach = np.max(np.where(bounded, np.max(np.abs(kept), axis=1), 0.0), axis=0)
+    with np.errstate(divide="ignore"):
+        return 2.0 ** np.round(np.log2(reach))
 
 
 def some_rows(

@@ -28,8 +28,8 @@ def first_status(t0, x, t1, gaps, rooms):
     return jnp.where(t1 < t0, BACKWARD, status)
 
 
-# a distance from a surface that the motion covers in this fraction of the period of the
-# forcing over 2 pi is zero
+# a motion that would reach a surface within this fraction of the period of the forcing
+# over 2 pi, and slide there, slides at once
 _AT_ONCE = 1e-12
 
 
@@ -37,9 +37,9 @@ def first_sides(functions: Functions, t, x, contact, time):
     """Return the sides of the switching surfaces on which a motion starts.
 
     A motion that starts on a surface enters one of its sides, or slides along it. If
-    both branches leave the surface, the system determines the side. For a velocity of
-    zero, the forced motion provides the only scale: `time` is the period of the forcing
-    over 2 pi (s), or zero.
+    both branches leave the surface, the system determines the side. A velocity of zero
+    has a rounding error, for which the forced motion provides the only scale: `time` is
+    the period of the forcing over 2 pi (s), or zero.
 
     Returns:
         Flags of the negative sides, then of sliding; the jets of the surfaces there, as
@@ -54,46 +54,44 @@ def first_sides(functions: Functions, t, x, contact, time):
     touched = list(free)
 
     def jet_of(k, flag):
-        """Return the jet of a surface on one of its sides, whether x is on the surface,
-        and whether the motion then moves into it.
+        """Return the jet of a surface on one of its sides, whether x is on the surface
+        or would reach it at once, whether it is on it, and whether the motion then
+        moves into it.
         """
         mode = (*contact, *sides[:k], flag, *sides[k + 1 :], *free)
         jets, roundings = functions.open_surfaces(t, x, mode)
-        jet, on = rounded(k, jets[k], roundings[k])
-        return jet, on, on & moves_in(jet, roundings[k])
-
-    def rounded(k, jet, rounding):
-        """Return a jet without the rounding error of a distance of zero, and whether it
-        is zero.
-        """
-        slow = _AT_ONCE * time * jnp.abs(jet.velocity)
-        on = jnp.abs(jet.gap) <= rounding + (slow if k in functions.slidable else 0.0)
-        return jet._replace(gap=jnp.where(on, 0.0, jet.gap)), on
+        on = jnp.abs(jets[k].gap) <= roundings[k]
+        jet = jets[k]._replace(gap=jnp.where(on, 0.0, jets[k].gap))
+        reach = roundings[k] + _AT_ONCE * time * jnp.abs(jet.velocity)
+        return jet, jnp.abs(jet.gap) <= reach, on, on & moves_in(jet, roundings[k])
 
     for k in range(functions.one_way):
         crossed = [jnp.asarray(False)] * functions.k
-        crossed[k] = jet_of(k, sides[k])[2]
+        crossed[k] = jet_of(k, sides[k])[-1]
         sides[:] = functions.turned(sides, crossed)
     for k in range(functions.one_way, functions.k):
         flag = sides[k]
-        own, _, leaves = jet_of(k, flag)
-        other, on, back = jet_of(k, ~flag)
-        touched[k] = on
+        own, near, _, leaves = jet_of(k, flag)
+        other, close, on, back = jet_of(k, ~flag)
         if k in functions.slidable:
             slack = functions.slack((*contact, *sides, *free))[k]
             # rate at which the two branches together hold the motion on the surface;
             # one of them may drive it away at up to `slack` times this rate
             together = -(own.velocity + other.velocity)
             fastest = jnp.maximum(own.velocity, other.velocity)
-            slides[k] = on & (together > 0) & (fastest <= slack * together)
+            holds = (together > 0) & (fastest <= slack * together)
+            slides[k] = (near | close) & holds
             leaves = leaves & ~slides[k]
         else:
             stuck = stuck | (leaves & on & back)
+        touched[k] = on | slides[k]
         sides[k] = flag ^ (leaves & ~back)
     sides, slides = _held_together(functions, t, x, contact, sides, touched, slides)
     jets, roundings = functions.open_surfaces(t, x, (*contact, *sides, *free))
-    pairs = enumerate(zip(jets, roundings, strict=True))
-    jets = [rounded(k, *pair)[0] for k, pair in pairs]
+    jets = [
+        jet._replace(gap=jnp.where((jnp.abs(jet.gap) <= r) | on, 0.0, jet.gap))
+        for jet, r, on in zip(jets, roundings, slides, strict=True)
+    ]
     return (*sides, *slides), jets, any_of(slides), stuck
 
 

@@ -13,9 +13,9 @@ _SPEED_TOLERANCE = 0.05
 # Largest follower angle (rad): the follower stays below the vertical, and values in
 # degrees exceed this limit
 _FOLLOWER_RANGE = np.pi / 2
-# If more than this fraction of the samples have the time of the one before, the times
-# are rounded
-_ROUNDED = 0.01
+# If at least this number, and more than this fraction, of the samples have the time of
+# the one before, the times are rounded
+_FEW, _ROUNDED = 5, 0.01
 # Smallest plausible sampling interval (s), below that of any encoder or gyro
 _SHORTEST = 1e-9
 
@@ -38,8 +38,15 @@ def find_gaps(
     back = np.flatnonzero(steps <= 0)
     if len(back):
         row = int(back[0])
-        if not np.any(steps < 0) and len(back) > _ROUNDED * len(steps):
-            rate = len(steps) / float(time[-1] - time[0])
+        length = float(time[-1] - time[0])
+        if length == 0:
+            raise RecordingError(
+                f"{name}: all times are {time[0]:.10g} s; check which column contains "
+                "the time."
+            )
+        many = len(back) >= _FEW and len(back) > _ROUNDED * len(steps)
+        if many and not np.any(steps < 0):
+            rate = len(steps) / length
             raise RecordingError(
                 f"{name}: {len(back)} samples have the same time as the one before, so "
                 f"the times seem to be rounded. If the samples are equidistant, leave "
