@@ -249,8 +249,15 @@ def test_states_are_eliminated_as_from_the_whole_matrix():
 
 
 def test_a_gain_that_falls_from_the_lowest_frequency_is_no_peak():
-    """Of a slow change and a weaker vibration, the vibration is the peak."""
-    frequency, falling = np.arange(1.0, 7.0), np.array([9.0, 7.0, 3.0, 2.0, 5.0, 4.0])
-    scan = Periodogram(frequency, falling, falling[::-1], 2)
+    """Of a slow change and a weaker vibration, the vibration is the peak, and so is a
+    vibration at the lowest frequency.
+    """
+    frequency = np.arange(1.0, 7.0)
+    falling = np.array([9.0, 7.0, 3.0, 2.0, 5.0, 4.0])
+    scan = Periodogram(frequency, falling, falling[::-1], 2, lowest=2.0)
     assert scan.best == (5.0, 5.0)
     assert scan.best_separate == (6.0, 9.0)
+    edge = np.array([3.0, 7.0, 3.0, 2.0, 1.0, 0.5])
+    alone = Periodogram(frequency, edge, np.sort(falling)[::-1], 2, lowest=2.0)
+    assert alone.best == (2.0, 7.0)
+    assert alone.best_separate == (6.0, 0.0)

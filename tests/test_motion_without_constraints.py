@@ -108,7 +108,15 @@ def test_a_gap_needs_an_impact_law():
             return jnp.zeros((0, 2))
 
     assert missing_method(Oscillator) is None
-    with pytest.raises(ValueError, match="Wall has no impact; add that method"):
+
+    class Misspelled(Oscillator):
+        constraint_names = ("left",)
+
+        def gaps(self, t, state):
+            return state[0]
+
+    assert missing_method(Misspelled) == "gap"
+    with pytest.raises(ValueError, match="Wall has constraints, but no impact; add"):
         jaxcam.simulate(Wall(), [1.0, 0.0], 0.0, 1.0)
     with pytest.raises(ValueError, match="leave out gap and impact"):
         jaxcam.simulate(Empty(), [1.0, 0.0], 0.0, 1.0)

@@ -33,7 +33,8 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
     run, start, end = found
     length = end - start
     events = (_obstacles(run) - start) / length
-    if not np.any(np.minimum(events, 1 - events) < _CLOSE):
+    nearest = np.min(np.minimum(events, 1 - events), initial=1.0)
+    if nearest >= _CLOSE:
         return None
     turned = (np.asarray(_first(run.switches, "time")) - start) / length
     marks = np.sort(np.concatenate([[0.0, 1.0], events, turned]))
@@ -42,7 +43,7 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
         (
             float(middles[k])
             for k in np.argsort(-widths)
-            if widths[k] > 2 * _CLOSE
+            if widths[k] > 2 * nearest
             and _may_start(run, float(start + middles[k] * length))
         ),
         None,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from ..discrepancy.report import listed
 from ..hybrid import HybridSystem
 from ..recordings import Segments
 from ..tables import counted
@@ -13,20 +14,23 @@ def found_impacts(segments: Sequence[Segments], system: HybridSystem) -> str:
     """
     impacts = sum(part.impacts.count for part in segments)
     contacts = sum(len(part.contacts) for part in segments)
-    if not impacts + contacts:
-        return ""
     sides = [int(side) for part in segments for side in part.impacts.side]
-    names = [
-        f"{system.constraint_name(side)}: {counted(sides.count(side), 'impact')}"
-        for side in sorted(set(sides))
+    named = [
+        f"{sides.count(side)} with {system.constraint_name(side)}"
+        for side in sorted(set(sides) | set(range(len(system.constraint_names))))
     ]
-    where = f" ({', '.join(names)})" if len(names) > 1 else ""
+    parts = []
+    if impacts:
+        where = f" ({listed(named)})" if len(named) > 1 else ""
+        parts.append(f"{counted(impacts, 'impact')}{where}")
+    if contacts:
+        parts.append(counted(contacts, "longer contact"))
+    if not parts:
+        return ""
     silent = [
         part.recording.name
         for part in segments
         if not part.impacts.count and not part.contacts
     ]
-    none = f", but none in {' and '.join(silent)}" if silent else ""
-    longer = f" and {counted(contacts, 'longer contact')}" if contacts else ""
-    found = f"{counted(impacts, 'impact')}{where}{longer}"
-    return f"Found in the recordings: {found}{none}."
+    none = f", but nothing in {listed(silent)}" if silent else ""
+    return f"Found in the recordings: {' and '.join(parts)}{none}."

@@ -120,7 +120,7 @@ def most_correlated(labels: Sequence[str], correlation) -> str:
     value = float(np.clip(correlation[i, k], -1.0, 1.0))
     if abs(value) < _WEAK:
         return (
-            "The errors of the fitted parameters hardly depend on each other: the "
+            "The errors of the fitted parameters depend little on each other: the "
             f"strongest correlation, between {labels[k]} and {labels[i]}, is "
             f"{value:+.4f}."
         )

@@ -12,6 +12,8 @@ from ..recordings import Recording
 # Motion is fast where a channel changes over three samples by this many times its
 # resolution: two equal successive samples are then no matter of rounding
 _FAST = 8.0
+# Changes below this fraction of the range of a channel are rounding
+_ROUNDING = 1e-9
 # Least number of samples in fast motion, and the fraction of them that may repeat the
 # one before
 _ENOUGH, _FEW = 30, 0.1
@@ -43,7 +45,9 @@ def _repeated(samples: Float[np.ndarray, " k"]) -> float:
     changes = steps[steps > 0]
     if len(steps) < _ENOUGH or not len(changes):
         return 0.0
-    fast = np.abs(samples[3:] - samples[:-3]) > _FAST * np.min(changes)
+    # the resolution, apart from changes that are only rounding of the numbers
+    step = np.min(changes[changes > _ROUNDING * np.ptp(samples)], initial=np.inf)
+    fast = np.abs(samples[3:] - samples[:-3]) > _FAST * step
     # a channel that mostly rests and jumps now and then is not in fast motion
     if np.sum(fast) < max(_ENOUGH, len(fast) / 4):
         return 0.0

@@ -85,7 +85,7 @@ class HybridSystem(eqx.Module):
             The gap, a scalar, or shape `(m,)` for m constraints.
         """
         del state
-        return jnp.ones_like(t)
+        return jnp.ones(jnp.shape(t))
 
     def impact(
         self, t: RealScalar, state: Float[Array, " n"]

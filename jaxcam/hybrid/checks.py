@@ -168,7 +168,8 @@ def missing_method(kind: type[HybridSystem]) -> str | None:
     """Return the name of a method that a class must still define, or `None`.
 
     Args:
-        kind: The class. A `gap` needs an `impact`, and the other way round.
+        kind: The class. A `gap` needs an `impact`, and the other way round; names of
+            constraints need both.
 
     Returns:
         The name of the method.
@@ -190,9 +191,9 @@ def missing_method(kind: type[HybridSystem]) -> str | None:
         all(getattr(kind, name) is not getattr(base, name) for base in bases)
         for name in ("gap", "impact")
     )
-    if gap == impact:
-        return None
-    return "impact" if gap else "gap"
+    if not gap and (impact or kind.constraint_names):
+        return "gap"
+    return "impact" if gap and not impact else None
 
 
 def _check_switches(system: SwitchedSystem) -> None:
@@ -243,7 +244,10 @@ def _check_modes(system: HybridAutomaton, t0, state) -> None:
 def _check_shapes(system, t0, state) -> None:
     missing = missing_method(type(system))
     if missing is not None:
-        raise ValueError(f"{type(system).__name__} has no {missing}; add that method")
+        raise ValueError(
+            f"{type(system).__name__} has constraints, but no {missing}; add that "
+            "method, or leave out gap, impact and constraint_names"
+        )
     n = state.shape[0]
     wanted = len(system.state_names)
     if wanted and wanted != n:

@@ -1,7 +1,8 @@
 """A cart on a spring between two stops: an example to edit.
 
 A system defines three functions of the state: the free motion, the gap to each
-constraint, and the state after an impact. Units are SI.
+constraint, and the state after an impact. Without stops, leave out the last two, and
+`constraint_names`. Units are SI.
 """
 
 import jax.numpy as jnp

@@ -31,7 +31,9 @@ class Periodogram:
     `gain` is for one phase in all recordings, `separate` for a separate phase in each
     recording. `records` is their number, `cells` the number of distinguishable
     frequencies (each has several grid points); `elsewhere` is the gain of the highest
-    separate peak without the recording in which it gains most.
+    separate peak without the recording in which it gains most. Frequencies below
+    `lowest` (Hz) only show whether the gain has a peak above it: a gain that falls from
+    there on belongs to a slower change, which is not a vibration.
     """
 
     frequency: Float[np.ndarray, " k"]
@@ -40,29 +42,30 @@ class Periodogram:
     records: int
     cells: int = 1
     elsewhere: float = 0.0
+    lowest: float = 0.0
 
     @property
     def best(self) -> tuple[float, float]:
         """Frequency (Hz) and gain of the highest peak with one phase."""
-        k = _highest(self.gain)
-        return float(self.frequency[k]), float(self.gain[k])
+        return _highest(self.frequency, self.gain, self.lowest)
 
     @property
     def best_separate(self) -> tuple[float, float]:
         """Frequency (Hz) and gain of the highest peak with separate phases."""
-        k = _highest(self.separate)
-        return float(self.frequency[k]), float(self.separate[k])
+        return _highest(self.frequency, self.separate, self.lowest)
 
 
-def _highest(gain: Float[np.ndarray, " k"]) -> int:
-    """Return the index of the highest peak.
+def _highest(frequency, gain, lowest: float) -> tuple[float, float]:
+    """Return frequency and gain of the highest peak; a gain of zero if there is none.
 
-    A gain that only falls from the lowest frequency on belongs to a slower change,
-    which is not a vibration.
+    A peak is a local maximum, or the highest frequency.
     """
-    falls = np.diff(gain) <= 0
-    first = len(gain) - 1 if np.all(falls) else int(np.argmin(falls))
-    return first + int(np.argmax(gain[first:]))
+    before, after = gain[:-1], np.append(gain[2:], -np.inf)
+    peak = (gain[1:] >= before) & (gain[1:] >= after) & (frequency[1:] >= lowest)
+    if not np.any(peak):
+        return float(frequency[-1]), 0.0
+    k = 1 + int(np.argmax(np.where(peak, gain[1:], -np.inf)))
+    return float(frequency[k]), float(gain[k])
 
 
 def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodogram:
@@ -74,6 +77,10 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     if not len(frequency):
         none = np.zeros(1)
         return Periodogram(none, none, none, 1)
+    # one period below, to see whether the gain has a peak
+    lowest, grid = float(frequency[0]), policy.frequency_grid
+    below = lowest - np.arange(grid, 0, -1) / (grid * _longest(problem))
+    frequency = np.concatenate([below, frequency])
     rate = 2 * np.pi * frequency
     size = len(response.prior)
     information, score = np.diag(response.prior), response.pull.copy()
@@ -92,19 +99,21 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     whole = tuple(sum(part) for part in zip(*parts))
     gain = _gain(inside, score, [whole])
     separate = _gain(inside, score, parts)
-    top = [_highest(separate)]
+    peak_at, _ = _highest(frequency, separate, lowest)
+    top = [int(np.searchsorted(frequency, peak_at))]
     peak = [tuple(one[..., top] for one in part) for part in parts]
     rest = [_gain(inside, score, peak[:r] + peak[r + 1 :])[0] for r in range(len(peak))]
     elsewhere = min(rest) if len(peak) > 1 else 0.0
-    cells = max(1, len(frequency) // policy.frequency_grid)
-    return Periodogram(frequency, gain, separate, len(parts), cells, float(elsewhere))
+    cells = max(1, (len(frequency) - grid) // grid)
+    found = frequency, gain, separate
+    return Periodogram(*found, len(parts), cells, float(elsewhere), lowest)
 
 
 def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, " k"]:
     """Return frequencies from a few periods in the longest recording up to the highest
     that samples and integration steps resolve.
     """
-    length = max(part.recording.duration for part in problem.segments)
+    length = _longest(problem)
     interval = max(part.recording.interval for part in problem.segments)
     exists = np.asarray(problem.pieces.exists)
     step = float(np.max(np.asarray(problem.pieces.flown.step)[exists]))
@@ -112,6 +121,11 @@ def scanned_frequencies(problem: Problem, policy: Policy) -> Float[np.ndarray, "
     top = min(1 / (policy.period_samples * interval), 1 / (policy.period_steps * step))
     grid = 1 / (policy.frequency_grid * length)
     return np.arange(policy.fewest_periods / length, top, grid)
+
+
+def _longest(problem: Problem) -> float:
+    """Return the duration of the longest recording (s)."""
+    return max(part.recording.duration for part in problem.segments)
 
 
 class _Sums:
