@@ -1,6 +1,7 @@
 """Branches through changes of the sequence of events, located and named."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -14,8 +15,9 @@ from continuation.orbits._event_changes import (
     name_of_change,
     within_symmetry,
 )
+from continuation.orbits._start_of_period import moved_start
 from jaxcam.filippov.modes import surface_rates
-from jaxcam.hybrid import flow, Settings, SwitchedSystem
+from jaxcam.hybrid import flow, HybridAutomaton, Settings, SwitchedSystem
 from jaxcam.models import BouncingBall
 from jaxcam.parameters import as_arrays
 from jaxcam.thesis.chapter_2_dynamical_systems.figure_2_14 import sliding_events
@@ -207,6 +209,88 @@ def test_a_belt_oscillator_passes_the_grazing_of_its_stop():
     np.testing.assert_allclose(
         last.observed["stroboscopic"][0], settled.final, atol=1e-8
     )
+
+
+def _moved(system, period, time, state, leaf=0):
+    """The problem after its start has been moved, or None, and the new start (s)."""
+    system = as_arrays(system)
+    problem = continuation.SingleShooting(
+        system,
+        jnp.asarray(time / period),
+        jnp.ones(len(state)),
+        jnp.ones(len(state)),
+        Settings(tolerance=1e-12),
+        1,
+    )
+    number = float(jax.tree.leaves(system)[leaf])
+    found = moved_start(problem, leaf, np.append(state, number), None)
+    if found is None:
+        return None, time
+    return found, time + float(found[0].shift) * period
+
+
+class Sticking(jaxcam.HybridSystem):
+    """An oscillator that is forced against a stop and rests there."""
+
+    wall: float = -0.6
+
+    @property
+    def period(self):
+        return 2 * jnp.pi / 2.8
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], jnp.cos(2.8 * t) - state[0]])
+
+    def gap(self, t, state):
+        return self.wall - state[0]
+
+    def impact(self, t, state):
+        return jnp.stack([state[0], -0.3 * state[1]])
+
+
+@pytest.mark.parametrize(("time", "moves"), [(0.5, True), (0.79, True), (1.5, False)])
+def test_the_start_of_a_period_moves_out_of_a_contact(time, moves):
+    """In contact from 0.198 to 0.791 s; the new start is in flight, on the same motion
+    to 1e-9.
+    """
+    system = Sticking()
+    period = 2 * np.pi / 2.8
+    far = jaxcam.simulate(system, [-1.1, 0.0], 0.0, 60 * period + time)
+    found, later = _moved(system, period, time, far.final)
+    assert (found is not None) == moves
+    if found is None:
+        return
+    again = jaxcam.simulate(system, far.final, time, later, tolerance=1e-12).final
+    np.testing.assert_allclose(found[1][:-1], again, atol=1e-9)
+    assert 0.8 < later % period < period + 0.19
+    assert float(system.gap(later, again)) > 1e-3
+
+
+class Triangle(HybridAutomaton):
+    """Up and down between -1 and 1 at unit speed; a motion starts upwards."""
+
+    modes = ("up", "down")
+    transitions = (("up", "down"), ("down", "up"))
+    top: float = 1.0
+
+    @property
+    def period(self):
+        return 4.0 * self.top
+
+    def fields(self, t, state, sides):
+        return jnp.stack([jnp.ones(1), -jnp.ones(1)])
+
+    def guards(self, t, state):
+        return jnp.stack([self.top - state[0], self.top + state[0]])
+
+
+def test_the_start_of_a_period_moves_to_the_mode_in_which_a_motion_starts():
+    """The longest interval without a transition is downwards, where none can start."""
+    found, later = _moved(Triangle(), 4.0, 0.0, np.array([0.99]))
+    assert found is not None
+    # upwards from 2.01 s on
+    assert later == pytest.approx((2.01 + 4.0) / 2, abs=1e-9)
+    assert float(found[1][0]) == pytest.approx(later - 3.01, abs=1e-9)
 
 
 def _sequence(*kinds):

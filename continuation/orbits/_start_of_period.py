@@ -36,7 +36,7 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
     nearest = np.min(np.minimum(events, 1 - events), initial=1.0)
     if nearest >= _CLOSE:
         return None
-    turned = (np.asarray(_first(run.switches, "time")) - start) / length
+    turned = (_first(run.switches, "time") - start) / length
     marks = np.sort(np.concatenate([[0.0, 1.0], events, turned]))
     middles, widths = (marks[:-1] + marks[1:]) / 2, np.diff(marks)
     share = next(
@@ -63,7 +63,11 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
 
 
 def _first(events: Any, name: str):
-    """Return a column of a table of events, without empty rows."""
+    """Return a column of a table of events, without empty rows; a system without
+    switching surfaces has no table of them.
+    """
+    if events is None:
+        return np.zeros(0)
     return np.asarray(getattr(events, name))[: int(events.count)]
 
 
