@@ -1,9 +1,14 @@
 """The lines in which `jaxcam fit` and `jaxcam diagnose` say what they have read."""
 
-import numpy as np
+from types import SimpleNamespace
 
+import numpy as np
+import pytest
+
+from jaxcam.cli._found_impacts import found_impacts
 from jaxcam.cli._read_summary import channels_of, read_summary
 from jaxcam.data import DEMO_RIG
+from jaxcam.models import TwoSidedStop
 from jaxcam.recordings import read_case, read_recording, read_rig, Recording
 
 
@@ -42,3 +47,36 @@ def test_the_drive_of_a_cam_is_used():
     used = channels_of(read_rig(DEMO_RIG / "rig.toml"))
     _, second = read_summary(tuple(read_case(DEMO_RIG)), used)
     assert "cam_angle_rad" in second and "not used" not in second
+
+
+def _segments(name, sides, contacts=0):
+    """What a sentence about impacts needs to know about a recording."""
+    found = SimpleNamespace(count=len(sides), side=np.array(sides, dtype=int))
+    return SimpleNamespace(
+        recording=SimpleNamespace(name=name), impacts=found, contacts=(0,) * contacts
+    )
+
+
+@pytest.mark.parametrize(
+    ("parts", "sentence"),
+    [
+        ([([], 0)], ""),
+        ([([0], 0)], "1 impact (1 with upper stop and 0 with lower stop)."),
+        (
+            [([0, 1, 1], 1), ([], 0)],
+            "3 impacts (1 with upper stop and 2 with lower stop) and 1 longer "
+            "contact, but nothing in run1.",
+        ),
+        (
+            [([], 2), ([], 0), ([], 0)],
+            "2 longer contacts, but nothing in run1 and run2.",
+        ),
+    ],
+)
+@pytest.mark.usefixtures("unchecked_types")
+def test_impacts_that_were_found_are_counted(parts, sentence):
+    """By stop, with the recordings in which nothing was found."""
+    system = TwoSidedStop()
+    runs = [_segments(f"run{k}", *part) for k, part in enumerate(parts)]
+    expected = sentence and f"Found in the recordings: {sentence}"
+    assert found_impacts(runs, system) == expected

@@ -191,6 +191,12 @@ def test_rounded_times_are_said_to_be_rounded(tmp_path):
     table["time_s"] = np.round(np.arange(number) / 150.0, 2)
     sentence = refusal(written(tmp_path, text(table)))
     assert "seem to be rounded" in sentence and "--rate 149.6" in sentence
+    table["time_s"] = np.full(number, 3.0)
+    assert "all times are 3 s" in refusal(written(tmp_path, text(table)))
+    # a single row that is doubled
+    table["time_s"] = np.arange(number) / 50.0
+    table["time_s"][20] = table["time_s"][19]
+    assert "keep one of those" in refusal(written(tmp_path, text(table)))
 
 
 def test_other_units_than_the_name_says(tmp_path):

@@ -45,10 +45,11 @@ def read_summary(runs: Sequence[Recording], used: Collection[str]) -> tuple[str,
     rates = [1 / run.interval for run in runs]
     lengths = [run.duration for run in runs]
     each = "" if len(runs) == 1 else " each"
+    begins = _second(min(run.time[0] for run in runs))
     first = (
         f"Read {counted(len(runs), 'recording')} ({number}{named}): "
         f"{sum(map(len, runs))} samples at {_between(rates)} Hz, "
-        f"{_between(lengths)} s{each}, from {min(r.time[0] for r in runs):.4f} s to "
+        f"{_between(lengths)} s{each}, from {begins} s to "
         f"{max(r.time[-1] for r in runs):.4f} s."
     )
     ranges = [_range(runs, name) for name in used]
@@ -75,3 +76,8 @@ def _between(values: Sequence[float]) -> str:
     """Return one number, or the smallest and the largest if they differ visibly."""
     low, high = f"{min(values):.4g}", f"{max(values):.4g}"
     return low if low == high else f"{low} to {high}"
+
+
+def _second(time: float) -> str:
+    """Return a time (s) with four decimals, and zero without a sign."""
+    return f"{round(float(time), 4) + 0.0:.4f}"
