@@ -120,6 +120,7 @@ def test_the_reason_of_a_failed_fit_is_left_to_standard_error(
         after=after,
         again=None,
         seen=SimpleNamespace(sentences=lambda: []),
+        events="",
         doubted="The unit is in doubt.",
         laws={},
         remainder="Remainder.",

@@ -169,8 +169,9 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_SHIFTS",
         # when a constant and a slope of a function are those of the rig
         "_UNDETERMINED",
-        # how a phase is written
+        # how a phase is written, and the units of functions with a factor
         "_BELOW_ZERO",
+        "_FACTOR_UNITS",
         # points of a table of a hidden element
         "_DECADE",
         "_STEPS",

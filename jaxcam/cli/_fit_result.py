@@ -54,6 +54,11 @@ class Result:
         ]
 
     @property
+    def events(self) -> str:
+        """Return how many impacts were found; empty if there is none."""
+        return found_impacts(self.segments, self.problem.model.system)
+
+    @property
     def sentence(self) -> str:
         """Describe how the fit ended, and how well it explains the samples."""
         return f"{self.after.message} {self.remainder}"
@@ -257,8 +262,7 @@ def print_fit(output: Output, found: Result, notes: Sequence[str]) -> None:
 
     If a fit failed, the reason goes to standard error instead.
     """
-    events = found_impacts(found.segments, found.problem.model.system)
-    said = [sentence for sentence in (events, found.doubted) if sentence]
+    said = [sentence for sentence in (found.events, found.doubted) if sentence]
     for sentence in (*notes, *said, *found.seen.sentences()):
         output.print(sentence)
     output.print(parameter_table(found.problem, found.after, found.again))
