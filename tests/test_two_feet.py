@@ -162,6 +162,7 @@ def test_the_origin_of_the_height_makes_no_difference(feet=2):
     np.testing.assert_allclose(*ends, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_three_feet():
     """All of the above with a third foot in the middle; in one test, because the
     program takes long to compile.
