@@ -448,3 +448,19 @@ def test_changes_of_a_capsule_that_sticks_at_the_start_of_the_period():
             there = continuation.periodic_orbit(Capsule(one), orbit.state)
             numbers.append(sum(event.kind == name for event in there.signature))
         assert numbers == [before, after]
+
+
+class Undefined(jaxcam.HybridSystem):
+    """Its force is not a number at rest at the origin."""
+
+    @property
+    def period(self):
+        return 2 * jnp.pi
+
+    def vector_field(self, t, state):
+        return jnp.stack([state[1], jnp.cos(t) - jnp.log(state[0] - 1.0)])
+
+
+def test_the_reason_why_no_orbit_was_reached_is_said():
+    with pytest.raises(ValueError, match=r"started at \(0, 0\): The vector field, gap"):
+        continuation.periodic_orbit(Undefined())

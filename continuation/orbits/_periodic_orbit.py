@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxcam.hybrid import (
     HybridSystem,
+    RESULTS,
     Settings,
     simulate,
     stroboscope,
@@ -162,9 +163,11 @@ def _settled(system, base, number: int, free: bool, t0):
     run = stroboscope(system, start, _TURNS + _LOOKED, t0=float(t0))
     states = run.states[0, _TURNS:]
     if run.code[0] or not np.all(np.isfinite(states)):
+        first = ", ".join(f"{x:.4g}" for x in np.ravel(start))
+        why = f": {RESULTS[int(run.code[0])]}" if run.code[0] else "."
         raise ValueError(
             "the simulation that should converge to an orbit stopped early; give a "
-            "guess of the state"
+            f"guess of the state. It started at ({first}){why}"
         )
     when = float(t0) + (_TURNS + _LOOKED) * base
     moved = np.asarray(component_sizes(system, when, states[-1], base))
