@@ -80,6 +80,7 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     # one period below, to see whether the gain has a peak
     lowest, grid = float(frequency[0]), policy.frequency_grid
     below = lowest - np.arange(grid, 0, -1) / (grid * _longest(problem))
+    below = below[below > 0]
     frequency = np.concatenate([below, frequency])
     rate = 2 * np.pi * frequency
     size = len(response.prior)
@@ -104,7 +105,7 @@ def periodogram(problem: Problem, response: Response, policy: Policy) -> Periodo
     peak = [tuple(one[..., top] for one in part) for part in parts]
     rest = [_gain(inside, score, peak[:r] + peak[r + 1 :])[0] for r in range(len(peak))]
     elsewhere = min(rest) if len(peak) > 1 else 0.0
-    cells = max(1, (len(frequency) - grid) // grid)
+    cells = max(1, (len(frequency) - len(below)) // grid)
     found = frequency, gain, separate
     return Periodogram(*found, len(parts), cells, float(elsewhere), lowest)
 

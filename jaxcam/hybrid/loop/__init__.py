@@ -5,7 +5,7 @@ returns its record.
 """
 
 from ._advance import Plan as Plan
-from ._frame import lift_and_rest as lift_and_rest
+from ._frame import lift_and_remainder as lift_and_remainder
 from ._functions import Functions as Functions
 from ._gap_polynomial import Jet as Jet
 from ._iterate import iteration as iteration

@@ -43,7 +43,7 @@ def lift_of(system, t, x):
     return gradient / jnp.where(square > 0, square, 1.0)
 
 
-def lift_and_rest(system, t, x):
+def lift_and_remainder(system, t, x):
     """Return `lift_of`, and what is left of each gap after the displacement that would
     close it if it were linear; unlimited for a gap that does not depend on the state.
     """

@@ -49,7 +49,7 @@ from ._derived import (
     nested_series,
     planar_jet,
 )
-from ._frame import frame_of, lift_and_rest
+from ._frame import frame_of, lift_and_remainder
 from ._jumps import jumping_components
 
 
@@ -160,7 +160,7 @@ class Programs:
         self._add("impact", impacts, time, state)
         self._add("velocity", normal_velocity, time, state)
         self._add("frame", frame_of, time, state)
-        self._add("lift", lift_and_rest, time, state)
+        self._add("lift", lift_and_remainder, time, state)
         self._add("speed_blur", speed_rounding, time, state, state)
         speeds = jax.ShapeDtypeStruct((self.m,), jnp.float64)
         ends = state, state, speeds, speeds

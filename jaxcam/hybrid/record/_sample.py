@@ -146,7 +146,7 @@ def advance(
 
 def _move(system, functions, settings, scale, t, x, mode, h, inside):
     if isinstance(settings.solver, diffrax.AbstractImplicitSolver):
-        held = jnp.array(mode[: functions.m], dtype=bool)
+        held = jnp.stack(mode[: functions.m])
 
         def field(s, y):
             return field_in_force(system, inside(s), y, held)

@@ -10,7 +10,7 @@ import numpy as np
 import optimistix as optx
 
 from .._system import HybridSystem
-from ..loop import first_extents, Jet, lift_and_rest
+from ..loop import first_extents, Jet, lift_and_remainder
 from ..programs import program
 from ..surface import (
     completion_time,
@@ -203,7 +203,7 @@ class CompiledMotion(eqx.Module):
     @_compiled
     def extents(self, t, x):
         """Return the origins and the initial scales of the components, each `(n,)`."""
-        lifts, left = lift_and_rest(self.system, t, x)
+        lifts, left = lift_and_remainder(self.system, t, x)
         jets = [Jet(*row) for row in jnp.stack(self._free_series(3)(t, x), axis=1)]
         tinies = least_gaps(self.system, t, x) - gaps(self.system, t, x)
         origin, found = first_extents(

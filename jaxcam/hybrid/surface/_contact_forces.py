@@ -80,8 +80,6 @@ def contact_forces(
     terms: ContactTerms | None = None,
 ) -> ContactForces:
     """Return the multipliers and the field; `terms` are computed unless given."""
-    if not contact.shape[0]:
-        return ContactForces(jnp.zeros((0,)), system.vector_field(t, x))
     terms = contact_terms(system, t, x) if terms is None else terms
     drift, gradient, _ = terms
     free, pushes = system.vector_field(t, x), _pushes(system, t, x, terms)

@@ -38,15 +38,14 @@ def find_gaps(
     back = np.flatnonzero(steps <= 0)
     if len(back):
         row = int(back[0])
-        length = float(time[-1] - time[0])
-        if length == 0:
+        if np.all(steps == 0):
             raise RecordingError(
                 f"{name}: all times are {time[0]:.10g} s; check which column contains "
                 "the time."
             )
         many = len(back) >= _FEW and len(back) > _ROUNDED * len(steps)
         if many and not np.any(steps < 0):
-            rate = len(steps) / length
+            rate = len(steps) / float(time[-1] - time[0])
             raise RecordingError(
                 f"{name}: {len(back)} samples have the same time as the one before, so "
                 f"the times seem to be rounded. If the samples are equidistant, leave "
