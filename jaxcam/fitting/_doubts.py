@@ -13,6 +13,7 @@ from .engine import (
     IMPACT,
     Point,
     Problem,
+    unexplained_jumps,
     Weights,
 )
 
@@ -43,6 +44,7 @@ class Doubt(enum.Enum):
     ON_A_BOUND = "a parameter is at a bound"
     NOT_CONSTRAINED = "the data do not constrain a parameter"
     TOO_MANY_EVENTS = "a piece of a recording contains more events than are located"
+    UNEXPLAINED_SWITCH = "the samples show a switch where the model does not switch"
 
 
 class Reason(NamedTuple):
@@ -167,4 +169,26 @@ def too_many_events(problem: Problem, point: Point, weights: Weights | None) -> 
         f"{problem.records[r]} at {when:.4g} s. If the model switches so often only "
         "for the present parameters, start from others; otherwise replace the "
         "switching by a smooth law."
+    )
+
+
+def unexplained_switches(
+    problem: Problem, point: Point, weights: Weights | None
+) -> str:
+    """Return a sentence if no event of the model leads to the mode in which a piece
+    begins, otherwise an empty string.
+    """
+    weights = weights or problem.everything()
+    jumps = unexplained_jumps(problem.layout, problem.pieces, point)
+    jumps = jumps & (np.asarray(weights.flown) > 0)
+    if not np.any(jumps):
+        return ""
+    r, k = np.argwhere(jumps)[0]
+    when = float(np.asarray(problem.pieces.flown.start)[r, k])
+    times = "once" if np.sum(jumps) == 1 else f"{np.sum(jumps)} times"
+    return (
+        f"The samples show {times} that the mode (or the side of a surface with "
+        f"hysteresis) changes where the model does not switch, first in "
+        f"{problem.records[r]} near {when:.4g} s. Start from thresholds with which the "
+        "model switches there, or add the transition that it lacks."
     )

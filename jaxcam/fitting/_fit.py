@@ -21,6 +21,8 @@ from .engine import (
     own_states,
     Point,
     Problem,
+    settled,
+    unexplained_jumps,
     Weights,
 )
 
@@ -28,6 +30,9 @@ from .engine import (
 _ITERATIONS = 60
 # A flight with more pieces than this is first fitted with loose joints
 _LONG = 16
+# Maximum number of times that the discrete states of a system with memory are chosen
+# anew, and the relative decrease of the cost below which this ends
+_ROUNDS, _LITTLE = 6, 1e-3
 # Factors on parameters without a tolerance, for restarts of a fit that ended far from
 # the data
 _FACTORS = (0.7, 1.4, 0.5, 2.0)
@@ -104,11 +109,15 @@ def fit(
 
     def loosely():
         most = max(iterations, _ITERATIONS)
-        return descend(_loose(objective), point, most).point
+        return _descend_loosely(objective, point, most)
 
-    long = problem.longest_flight > _LONG and fresh and not already_loose(extras)
-    first = loosely() if long else point
+    remembers = point.discrete is not None
+    gently = problem.longest_flight > _LONG or remembers
+    gently = gently and fresh and not already_loose(extras)
+    first = loosely() if gently else point
     found = descend(objective, first, iterations, stop, progress, tolerance)
+    if fresh and stop is None and iterations > 0 and remembers:
+        found = _with_other_modes(objective, found, weights, iterations, tolerance)
     # if the cost is far above the noise, there may be a better optimum; a caller who
     # gives `stop` or `start` has to search for it
     if fresh and stop is None and iterations > 0 and _far(problem, found, weights):
@@ -125,6 +134,55 @@ def fit(
             if again.optimal and not again.cost > found.cost + tolerance:
                 found = again._replace(count=found.count + again.count)
     return finish(problem, columns, *found, prior=prior, weights=weights)
+
+
+def _descend_loosely(objective: Objective, point: Point, iterations: int) -> Point:
+    """Return the end of a descent with loose joints within flights.
+
+    For a system with several discrete states, the most likely ones are chosen again for
+    the parameters found, until they no longer change: with inaccurate parameters, a
+    piece may begin in the wrong one.
+    """
+    problem, loose = objective.problem, _loose(objective)
+    for _ in range(_ROUNDS):
+        point = descend(loose, point, iterations).point
+        if point.discrete is None:
+            break
+        again = own_states(problem.layout, problem.pieces, loose.extras, point)
+        if np.array_equal(np.asarray(again.discrete), np.asarray(point.discrete)):
+            break
+        point = again
+    return point
+
+
+def _with_other_modes(
+    objective: Objective, found: Descent, weights, iterations: int, tolerance: float
+) -> Descent:
+    """Return the result of descents that begin again with the most likely discrete
+    states for the parameters found so far, as long as they improve a poor fit.
+    """
+    problem = objective.problem
+    for _ in range(_ROUNDS):
+        at = problem.layout, problem.pieces, found.point
+        jumps = unexplained_jumps(*at) & (np.asarray(objective.extras.weight) > 0)
+        if found.optimal and not np.any(jumps) and not _far(problem, found, weights):
+            break
+        start = own_states(*at[:2], objective.extras, found.point)
+        start = _descend_loosely(objective, start, _ITERATIONS)
+        again = descend(objective, start, iterations, tolerance=tolerance)
+        better = again.cost < found.cost * (1 - _LITTLE)
+        found = again if again.cost < found.cost else found
+        if not better:
+            break
+    for _ in range(_ROUNDS):
+        start = settled(problem.layout, problem.pieces, found.point)
+        if start is None:
+            break
+        again = descend(objective, start, iterations, tolerance=tolerance)
+        if not again.cost < found.cost:
+            break
+        found = again
+    return found
 
 
 def _far(problem, found: Descent, weights) -> bool:
@@ -159,7 +217,7 @@ def _other_starts(objective: Objective, point: Point, loosely: Callable[[], Poin
                 continue
             moved[:, p] = np.clip(factor * values[:, p], one.lower, one.upper)
         if not np.array_equal(moved, values):
-            at = Point(jnp.asarray(moved), point.states)
+            at = point._replace(values=jnp.asarray(moved))
             start = own_states(problem.layout, problem.pieces, objective.extras, at)
             yield descend(_loose(objective), start, _ITERATIONS).point
 

@@ -13,7 +13,8 @@ from scipy.optimize import least_squares
 from ..hybrid.programs import program
 from ..parameters import as_arrays
 from ..recordings import Recording, Segments
-from ._free_run import free_run, FreeRun, Prepared, prepared, restarted, simulated
+from ._free_run import free_run, FreeRun
+from ._free_run_motion import Prepared, prepared, restarted, simulated
 from .engine import (
     Layout,
     Model,

@@ -17,6 +17,7 @@ from ._doubts import (
     poor_fit,
     Reason,
     too_many_events,
+    unexplained_switches,
 )
 from ._ellipse import Ellipse, ellipse_of, most_correlated
 from ._unconstrained import Unconstrained, unconstrained
@@ -135,6 +136,8 @@ class Fit:
             found += [Reason(Doubt.POOR_FIT, far)] if far else []
             many = too_many_events(self.problem, self.point, self.weights)
             found += [Reason(Doubt.TOO_MANY_EVENTS, many)] if many else []
+            jumps = unexplained_switches(self.problem, self.point, self.weights)
+            found += [Reason(Doubt.UNEXPLAINED_SWITCH, jumps)] if jumps else []
         bounds = on_a_bound(self.problem, self.free, self.point)
         found += [Reason(Doubt.ON_A_BOUND, one) for one in bounds]
         found += [

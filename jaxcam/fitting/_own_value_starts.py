@@ -43,7 +43,7 @@ def own_value_starts(objective: Objective, point: Point) -> Point | None:
         for value in np.clip(middle + shares * one.tolerance, one.lower, one.upper):
             values = np.array(best.values)
             values[:, p] = value
-            at = Point(jnp.asarray(values), point.states)
+            at = point._replace(values=jnp.asarray(values))
             at = own_states(problem.layout, problem.pieces, objective.extras, at)
             costs = _record_costs(objective, at)
             # a cost that is not finite is never better

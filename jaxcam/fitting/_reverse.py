@@ -44,7 +44,7 @@ def cost_and_gradient(
 def _gradient(layout, pieces, extras, point, where, values):
     # from here on, the parameter values are part of the model
     model = layout.at(point.values[0])
-    bare = Point(point.values[:, :0], point.states)
+    bare = point._replace(values=point.values[:, :0])
 
     @eqx.filter_value_and_grad
     def cost(values):

@@ -4,6 +4,7 @@ import abc
 from typing import ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ._switched import SwitchedSystem
@@ -207,6 +208,21 @@ class HybridAutomaton(SwitchedSystem):
             digits = self.modes.index(before) ^ self.modes.index(after)
             found.append(tuple(b for b in range(self._bits) if digits >> b & 1))
         return (*found, *((k,) for k in range(self.one_way, number)))
+
+    def remembered_sides(self, number: int) -> Int[np.ndarray, "discrete k"]:
+        """Return the sides that depend on the past, in each discrete state: those that
+        store the mode, and those of `surfaces` with hysteresis.
+        """
+        others = super().remembered_sides(number - self.one_way)
+        # the first sides are the binary digits of the index of the mode
+        digits = np.arange(len(self.modes))[:, None] >> np.arange(self.one_way) & 1
+        return np.concatenate(
+            [
+                np.repeat(1 - 2 * digits, len(others), axis=0),
+                np.tile(others, (len(self.modes), 1)),
+            ],
+            axis=1,
+        )
 
     @property
     def _bits(self) -> int:

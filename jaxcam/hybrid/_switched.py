@@ -1,12 +1,13 @@
 """Define a system whose vector field has several branches, joined at surfaces."""
 
 import abc
+import itertools
 from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ._system import HybridSystem
 from ._types import RealScalar, State
@@ -168,6 +169,23 @@ class SwitchedSystem(HybridSystem):
             Indices of surfaces: by default, each surface only changes its own side.
         """
         return tuple((k,) for k in range(number))
+
+    def remembered_sides(self, number: int) -> Int[np.ndarray, "discrete k"]:
+        """Return the sides that depend on the past, in each discrete state.
+
+        By default, these are the sides of all surfaces if the class defines a
+        `hysteresis`, in every combination; otherwise there is a single discrete state.
+
+        Args:
+            number: Number of surfaces, k.
+
+        Returns:
+            +1 or -1 for each surface, or 0 if the state determines the side; one row
+                for each discrete state.
+        """
+        if type(self).hysteresis is SwitchedSystem.hysteresis:
+            return np.zeros((1, number), dtype=int)
+        return np.array(list(itertools.product((1, -1), repeat=number)), dtype=int)
 
     @property
     def hysteresis(self) -> Any:

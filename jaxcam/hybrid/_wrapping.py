@@ -4,6 +4,8 @@ import abc
 from typing import Any
 
 import equinox as eqx
+import numpy as np
+from jaxtyping import Int
 
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
@@ -148,6 +150,10 @@ class SwitchedWrapping(Wrapping, SwitchedSystem):
     def sides_changed(self, number: int) -> tuple[tuple[int, ...], ...]:
         """Return, for each surface, the surfaces whose sides change at its crossing."""
         return self.inner.sides_changed(number)
+
+    def remembered_sides(self, number: int) -> Int[np.ndarray, "discrete k"]:
+        """Return the sides that depend on the past, in each discrete state."""
+        return self.inner.remembered_sides(number)
 
     @property
     def one_way(self) -> int:

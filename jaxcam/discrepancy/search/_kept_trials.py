@@ -64,12 +64,15 @@ class KeptTrials:
             ):
                 if str(found["mark"]) != self.mark:
                     return None
-                values, states = found["values"], found["states"]
+                point = Point(
+                    jnp.asarray(found["values"]),
+                    jnp.asarray(found["states"]),
+                    jnp.asarray(found["discrete"]) if "discrete" in found else None,
+                )
                 converged, iterations = bool(found["converged"]), found["iterations"]
                 iterations = int(iterations)
         except _BROKEN:
             return None
-        point = Point(jnp.asarray(values), jnp.asarray(states))
         return Ended(point, converged, iterations)
 
     def put(self, names: Iterable[str], ended: Ended) -> None:
@@ -77,14 +80,18 @@ class KeptTrials:
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self._file(names)
         part = file.with_suffix(f".{os.getpid()}.part")
+        arrays = {
+            name: np.asarray(one)
+            for name, one in ended.point._asdict().items()
+            if one is not None
+        }
         with part.open("wb") as stream:
             np.savez(
                 stream,
                 mark=np.array(self.mark),
-                values=np.asarray(ended.point.values),
-                states=np.asarray(ended.point.states),
                 converged=np.array(ended.converged),
                 iterations=np.array(ended.iterations),
+                **arrays,  # pyright: ignore
             )
         os.replace(part, file)
 

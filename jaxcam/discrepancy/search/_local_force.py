@@ -18,6 +18,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ...fitting import engine, Problem
 from ...fitting.engine import (
+    begun,
     each_record,
     eliminate_states,
     filtered_channels,
@@ -30,8 +31,10 @@ from ...fitting.engine import (
     prior_information,
     runge_kutta,
     shows_directly,
+    states_and_sides,
 )
 from ...hybrid.programs import program
+from ...hybrid.surface import OnSides
 from ...parameters import FloatScalar
 from ..terms import Motion, Term
 from ._blocks import Blocks
@@ -113,7 +116,8 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     nodes = 2 * problem.pieces.steps // stride + 1
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
     shown = shows_directly(problem.layout, problem.pieces, local, scales)
-    every = problem.pieces, problem.weighted(None), point.states, local, scales
+    extras = problem.weighted(None)
+    every = begun(problem.pieces, point), extras, point.states, local, scales
 
     def record(row):
         values, one = of_record((point.values, every), row)
@@ -299,25 +303,35 @@ def _linear(
 def _motion(layout, pieces, point) -> Motion:
     """Return the motion at the ends and the middle of every step of every piece."""
 
-    def piece(model, state, start, step, drive):
+    def piece(model, state, start, step, drive, discrete):
         size = state.shape[0] - len(filtered_channels(model))
+        known = None
+        if discrete is not None:
+            given = model, state, start, step, drive
+            known = states_and_sides(*given, discrete)
 
         def advance(x, inputs):
-            number, here = inputs
+            number, here, known = inputs
             t = start + (number + jnp.array([0.0, 0.5, 1.0])) * step
-            during = model.during(t[1], here)
+            during = free = model.during(t[1], here)
+            if known is not None:
+                x, negative = known
+                during = lambda t: OnSides(free(t), negative)
             middle, _ = runge_kutta(model, during, t[0], x, step / 2)
             end, _ = runge_kutta(model, during, t[1], middle, step / 2)
             states = jnp.stack([x, middle, end])[:, :size]
 
             def motion(t, x):
-                system = during(t)
-                return system.motion(t, x, field=system.base.vector_field(t, x))
+                system = free(t)
+                base = system.base
+                if known is not None:
+                    base = OnSides(base, known[1])
+                return system.motion(t, x, field=base.vector_field(t, x))
 
             return end, jax.vmap(motion)(t, states)
 
         numbers = jnp.arange(drive.angle.shape[0], dtype=float)
-        _, found = jax.lax.scan(advance, state, (numbers, drive))
+        _, found = jax.lax.scan(advance, state, (numbers, drive, known))
 
         def in_order(part):
             inner = part[:, :2].reshape(-1, *part.shape[2:])
@@ -328,10 +342,10 @@ def _motion(layout, pieces, point) -> Motion:
     def record(pieces, values, states):
         model = layout.at(values)
         part = pieces.flown
-        inputs = states, part.start, part.step, pieces.drive
+        inputs = states, part.start, part.step, pieces.drive, pieces.begins
         return jax.vmap(lambda *one: piece(model, *one))(*inputs)
 
-    return jax.vmap(record)(pieces, *point)
+    return jax.vmap(record)(begun(pieces, point), point.values, point.states)
 
 
 @program

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...fitting import fit, Problem
-from ...fitting.engine import own_states, Point
+from ...fitting.engine import own_states
 
 
 def with_own_values(problem: Problem, rig: Sequence[str]) -> Problem:
@@ -41,6 +41,6 @@ def with_own_values(problem: Problem, rig: Sequence[str]) -> Problem:
         else one
         for one in problem.parameters
     )
-    point = Point(jnp.asarray(values), problem.start.states)
+    point = problem.start._replace(values=jnp.asarray(values))
     point = own_states(problem.layout, problem.pieces, problem.extras, point)
     return dataclasses.replace(problem, parameters=parameters, start=point)

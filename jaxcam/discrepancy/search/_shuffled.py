@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ...fitting import Problem
-from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Where
 from ._free_fits import FreeFits, Missing
@@ -80,7 +79,7 @@ def _shares(
     heat, point = heat_of(found.fit), found.fit.point
     others = [other for other in found.functions if other.slot != one.slot]
     problem = heated(filled(problem, others), heat)
-    point = Point(emptied(problem, point.values, one.slot), point.states)
+    point = point._replace(values=emptied(problem, point.values, one.slot))
     response = force_response(problem, point, fits.rig)
     nodes = Nodes.of(problem, response, heat)
     forces = _functions(nodes, found, one)

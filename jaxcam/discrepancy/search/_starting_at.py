@@ -24,7 +24,11 @@ def starting_at(found: Fit, problem: Problem) -> Point:
             values[:, column] = known[:, found.problem.names.index(name)]
     point = problem.start._replace(values=jnp.asarray(values))
     if _divided_alike(found.problem, problem, rows):
-        return point._replace(states=jnp.asarray(np.asarray(found.point.states)[rows]))
+        _, states, discrete = (
+            None if one is None else jnp.asarray(np.asarray(one)[rows])
+            for one in found.point
+        )
+        return point._replace(states=states, discrete=discrete)
     return own_states(problem.layout, problem.pieces, problem.extras, point)
 
 

@@ -16,6 +16,8 @@ from ._columns import (
     sound_information as sound_information,
 )
 from ._damped_step import damped_step as damped_step
+from ._discrete_starts import settled as settled, unexplained_jumps as unexplained_jumps
+from ._discrete_states import number_of_discrete_states as number_of_discrete_states
 from ._each_record import each_record as each_record, of_record as of_record
 from ._eliminate import (
     eliminate_states as eliminate_states,
@@ -26,10 +28,12 @@ from ._event_limit import crowded_pieces as crowded_pieces
 from ._extras import Extras as Extras
 from ._fly import runge_kutta as runge_kutta
 from ._known_constants import with_constants as with_constants
+from ._late_switch import JUMP as JUMP
 from ._layout import Layout as Layout
 from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
 from ._linearise import (
     assemble as assemble,
+    begun as begun,
     Blocks as Blocks,
     cost_by_recording as cost_by_recording,
     cost_of as cost_of,
@@ -52,7 +56,11 @@ from ._model import (
     state_channels as state_channels,
     Turning as Turning,
 )
-from ._modes import first_mode as first_mode, surfaces_in as surfaces_in
+from ._modes import (
+    discrete_state_of as discrete_state_of,
+    first_mode as first_mode,
+    surfaces_in as surfaces_in,
+)
 from ._moving_surface import moves_surface as moves_surface
 from ._output import Output as Output
 from ._own_states import own_states as own_states
@@ -74,5 +82,6 @@ from ._sharpness import (
 from ._starts import state_size as state_size
 from ._switched_steps import (
     EVENTS as EVENTS,
+    states_and_sides as states_and_sides,
     switched_steps as switched_steps,
 )

@@ -7,10 +7,12 @@ from jaxtyping import Float
 
 from ...hybrid.programs import program
 from ...hybrid.surface import gaps
-from ._fly import end_of_flight
+from ._discrete_states import discrete_ends
+from ._ends import ends_of
 from ._layout import Layout
-from ._linearise import Point
+from ._linearise import begun, Point
 from ._model import DriveState
+from ._modes import on_side_of
 from ._pieces import IMPACT, Pieces
 from ._problem import Problem
 from ._starts import state_size
@@ -61,12 +63,14 @@ def _closing(layout: Layout, pieces: Pieces, point: Point):
     def one(values, states, pieces):
         model = layout.at(values)
         size, part = state_size(model), pieces.flown
-        inputs = states, part.start, part.step, pieces.drive
-        ends = jax.vmap(lambda *a: end_of_flight(model, *a, substeps=substeps))(*inputs)
+        ends, discrete = ends_of(model, pieces, states, substeps), None
+        if pieces.begins is not None:
+            discrete = discrete_ends(model, pieces, states).last
         times = part.start + part.step * part.place.shape[-2]
 
-        def derivatives(t, x, drive, step):
+        def derivatives(t, x, drive, step, discrete):
             system = model.during(t - step / 2, drive)(t)
+            system = on_side_of(system, t, x, discrete)
 
             def along(function):
                 def rate(t, x):
@@ -83,6 +87,6 @@ def _closing(layout: Layout, pieces: Pieces, point: Point):
 
         # in the middle of the last step
         last = DriveState(*(part[:, -1] for part in pieces.drive))
-        return jax.vmap(derivatives)(times, ends[:, :size], last, part.step)
+        return jax.vmap(derivatives)(times, ends[:, :size], last, part.step, discrete)
 
-    return jax.vmap(one)(point.values, point.states, pieces)
+    return jax.vmap(one)(point.values, point.states, begun(pieces, point))

@@ -5,7 +5,7 @@ import numpy as np
 
 from ._columns import gathered, off_nominal, prior_information
 from ._eliminate import eliminate_states, LEAST, state_steps
-from ._linearise import Blocks, Point
+from ._linearise import Blocks
 
 
 def damped_step(problem, columns, blocks, point, damping, prior, states=0.0):
@@ -31,7 +31,8 @@ def damped_step(problem, columns, blocks, point, damping, prior, states=0.0):
         values[r, local[used]] += change[place[used]] * columns.scale[place[used]]
     # the decrease that the quadratic model of the cost predicts for the full step
     gain = float(change @ score) + _state_gain(blocks, found)
-    moved = Point(jnp.asarray(values), point.states + steps)
+    states = point.states + steps
+    moved = point._replace(values=jnp.asarray(values), states=states)
     return moved, gain
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Bool
 from ...hybrid import SwitchedSystem
 from ...hybrid.programs import program
 from ._layout import Layout
-from ._linearise import Point
+from ._linearise import begun, Point
 from ._pieces import Pieces
 from ._problem import Problem
 from ._switched_steps import has_more_events
@@ -35,13 +35,14 @@ def crowded_pieces(problem: Problem, point: Point) -> Bool[np.ndarray, "r k"]:
 def _crowded(layout: Layout, pieces: Pieces, point: Point):
     substeps = jnp.max(pieces.substeps)
 
-    def record(values, *inputs):
-        model = layout.at(values)
+    def record(values, states, pieces):
+        model, part = layout.at(values), pieces.flown
 
-        def crowded(state, start, step, drive):
-            return has_more_events(model, state, start, step, drive, substeps)
+        def crowded(state, start, step, drive, begin):
+            given = model, state, start, step, drive
+            return has_more_events(*given, substeps, begin)
 
+        inputs = states, part.start, part.step, pieces.drive, pieces.begins
         return jax.vmap(crowded)(*inputs)
 
-    times = pieces.flown.start, pieces.flown.step
-    return jax.vmap(record)(point.values, point.states, *times, pieces.drive)
+    return jax.vmap(record)(point.values, point.states, begun(pieces, point))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ...hybrid.runge_kutta import array_step, RK4
@@ -184,6 +185,8 @@ def _first_event(steps: Steps, number, t, x, mode: Mode, left, wanted) -> _Reach
     """
     field, system_at = steps.field(number, mode), steps.in_mode(number, mode)
     size = steps.size
+    if np.any(steps.surfaces.transitions):
+        beginning = switching_distances(system_at(t), t, x[:size])
 
     def narrow(carried):
         turn, a, low, b, high, kept, crossed, whole, _ = carried
@@ -192,7 +195,10 @@ def _first_event(steps: Steps, number, t, x, mode: Mode, left, wanted) -> _Reach
         there, _, _ = array_step(RK4, field, t, x, trial)
         distances = switching_distances(system_at(t + trial), t + trial, there[:size])
         whole = jnp.where(turn == 0, there, whole)
-        crossed = jnp.where(turn == 0, wanted & (distances < 0), crossed)
+        below = distances < 0
+        if np.any(steps.surfaces.transitions):
+            below = below & ~_leaving(steps, beginning, distances, left)
+        crossed = jnp.where(turn == 0, wanted & below, crossed)
         least = jnp.argmin(jnp.where(crossed, distances, jnp.inf))
         value, last = distances[least], (least, trial, there)
         beyond = (value < 0) & (turn != 1)
@@ -235,3 +241,17 @@ def _first_event(steps: Steps, number, t, x, mode: Mode, left, wanted) -> _Reach
         ends,
         Mode(*(jnp.where(found, a, b) for a, b in zip(new, mode))),
     )
+
+
+def _leaving(steps: Steps, begin, end, left) -> Bool[Array, " k"]:
+    """Return which guards are negative at the beginning only because the state has an
+    error: at their rates of change, they would be positive before the piece ends.
+
+    In an exact motion, such a guard is zero when its mode begins. An example is the
+    slip of a clutch that starts to slip.
+
+    **Arguments:** the distances after the time `left` and at its beginning.
+    """
+    duration = steps.count * steps.step
+    later = begin + (end - begin) * (duration / left)
+    return jnp.asarray(steps.surfaces.transitions) & (begin < 0) & (later >= 0)

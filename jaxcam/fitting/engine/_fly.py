@@ -15,14 +15,21 @@ from ._switched_steps import Flight, switched_end, switched_flight, switched_nod
 
 
 def flight_with_substeps(
-    model: Model, state, start, step, drive: DriveState, substeps: Any = 1
+    model: Model,
+    state,
+    start,
+    step,
+    drive: DriveState,
+    substeps: Any = 1,
+    discrete=None,
 ) -> Flight:
     """Return the motion of a piece with substeps, without derivatives.
 
     **Arguments:** as for `fly`.
     """
     if isinstance(model.system, SwitchedSystem):
-        return switched_flight(model, state, start, step, drive, substeps)
+        given = model, state, start, step, drive, substeps
+        return switched_flight(*given, discrete=discrete)
     given = constant((model, state, start, step, drive))
     model, state, start, step, drive = given
     states, rates = _nodes(model, state, start, step, drive, substeps)
@@ -55,12 +62,19 @@ def fly_about(
 
 
 def fly(
-    model: Model, state, start, step, drive: DriveState, substeps: Any = 1
+    model: Model,
+    state,
+    start,
+    step,
+    drive: DriveState,
+    substeps: Any = 1,
+    discrete=None,
 ) -> tuple[Float[Array, " s"], Nodes]:
     """Integrate one piece of flight by the classical Runge-Kutta method.
 
     Each step is divided into `substeps` parts (a number or an integer array) for the
-    values, but not for the derivatives.
+    values, but not for the derivatives. The piece begins in the `discrete` state of
+    this index, or in that which the system determines.
 
     **Returns:** the state at the end of the piece `(n,)`, and its `Nodes`.
     """
@@ -68,26 +82,34 @@ def fly(
     if _is_one(substeps) and not isinstance(model.system, SwitchedSystem):
         states, rates = _nodes(*given, 1)
         return states[-1], readings(model, states, rates, start, step, drive)
-    return fly_about(flight_with_substeps(*given, substeps), *given)
+    return fly_about(flight_with_substeps(*given, substeps, discrete), *given)
 
 
 def fly_without_derivatives(
-    model: Model, state, start, step, drive: DriveState, substeps: Any = 1
+    model: Model,
+    state,
+    start,
+    step,
+    drive: DriveState,
+    substeps: Any = 1,
+    discrete=None,
 ) -> tuple[Float[Array, " s"], Nodes]:
     """Return the same as `fly`, without derivatives, by a smaller program."""
     given = model, state, start, step, drive
-    flight = flight_with_substeps(*given, substeps)
+    flight = flight_with_substeps(*given, substeps, discrete)
     return flight.states[-1], readings(
         model, flight.states, flight.rates, start, step, drive
     )
 
 
-def end_of_flight(model: Model, state, start, step, drive: DriveState, substeps):
+def end_of_flight(
+    model: Model, state, start, step, drive: DriveState, substeps, discrete=None
+):
     """Return the state at the end of a piece, `(n,)`, without derivatives; `substeps`
     may be traced.
     """
     if isinstance(model.system, SwitchedSystem):
-        return switched_end(model, state, start, step, drive, substeps)
+        return switched_end(model, state, start, step, drive, substeps, discrete)
     return _nodes(model, state, start, step, drive, substeps)[0][-1]
 
 

@@ -11,8 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._discrete_states import last_discrete_state
 from ._extras import Extras, Sharpness
 from ._fly import flight_with_substeps, fly_about
+from ._late_switch import follower
 from ._likelihood import score_all
 from ._model import Model
 from ._pieces import FLIGHT, IMPACT, Pieces
@@ -102,7 +104,7 @@ def linear_pieces(
     """
     size, origin = states.shape[-1], jnp.zeros(width)
     found = _linear_flights(model_at, pieces, extras, states, origin, shown)
-    end, end_rows, flown_cost, information, slope = found
+    (end, last), end_rows, flown_cost, information, slope = found
     pp, p, rested_cost = _linear_contacts(model_at, pieces, extras, origin)
 
     # derivatives with respect to the earlier state, the later state and the parameters
@@ -115,7 +117,8 @@ def linear_pieces(
 
     before = jnp.concatenate([states[:1], end[:-1]])
     turned = jnp.concatenate([jnp.zeros_like(end_rows[:1]), end_rows[:-1]])
-    off, joint_rows = jax.vmap(joint_of)(before, states, *joint_inputs(pieces))
+    inputs = joint_inputs(pieces, extras.sharpness, last)
+    off, joint_rows = jax.vmap(joint_of)(before, states, *inputs)
     joint_rows = joint_rows * strength(extras.sharpness, pieces.joint)[..., None]
     shared = jnp.sqrt(jnp.minimum(extras.weight, _previous(extras.weight)))[:, None]
     earlier, later, direct = (
@@ -146,16 +149,16 @@ def linear_pieces(
 def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, shown):
     """Linearise the pieces in flight.
 
-    **Returns:** for each piece, the state at its end and the derivatives of this state,
-    the cost, and information and score of the samples.
+    **Returns:** for each piece, the state and the discrete state at its end, the
+    derivatives of the state, the cost, and information and score of the samples.
     """
     part = pieces.flown
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
 
-    def piece(state, start, step, drive, place, value, weight):
+    def piece(state, start, step, drive, place, begin, value, weight):
         # outside the derivatives, because those of a loop that locates events take
         # long to compile
-        given = state, start, step, drive, pieces.substeps
+        given = state, start, step, drive, pieces.substeps, begin
         fine = flight_with_substeps(model_at(origin, start, step), *given)
 
         def flight(state, change):
@@ -186,7 +189,11 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
             shares = shares_of(lambda known: sampled(model, known), known)
             by_nodes, by_sensing = rows
             normal = normal_through(by_nodes, by_sensing, shares, *told)
-        return end, end_rows, found.cost, *normal
+        last = None
+        if begin is not None:
+            model = model_at(origin, start, step)
+            last = last_discrete_state(model, state, start, drive, fine)
+        return (end, last), end_rows, found.cost, *normal
 
     weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
     end, end_rows, costs, *normal = jax.vmap(piece)(
@@ -250,11 +257,13 @@ def _columns(function, *args):
     return jax.vmap(pushed, out_axes=(None, -1))(*unit)
 
 
-def flown(flying, model: Model, state, start, step, drive, place, *, substeps):
+def flown(
+    flying, model: Model, state, start, step, drive, place, discrete, *, substeps
+):
     """Return the end of a piece and its samples; `flying` is `fly`, or
     `fly_without_derivatives`.
     """
-    end, nodes = flying(model, state, start, step, drive, substeps)
+    end, nodes = flying(model, state, start, step, drive, substeps, discrete)
     along = _along(start, step, drive)
     return end, samples(model, nodes, calibration(model), start, step, place, along)
 
@@ -283,7 +292,7 @@ def rested_all(model: Model, pieces: Pieces, extras: Extras):
 
 def flight_inputs(pieces: Pieces):
     part = pieces.flown
-    return part.start, part.step, pieces.drive, part.place
+    return part.start, part.step, pieces.drive, part.place, pieces.begins
 
 
 def rest_inputs(pieces: Pieces, extras: Extras):
@@ -297,16 +306,31 @@ def rest_inputs(pieces: Pieces, extras: Extras):
     )
 
 
-def joint_inputs(pieces: Pieces):
-    return pieces.flown.start, pieces.drive_at, pieces.joint
+def joint_inputs(pieces: Pieces, sharpness: Sharpness, last):
+    """Return the arguments of `joint` after the states.
+
+    **Arguments:** `last` is the discrete state at the end of each piece, or `None`.
+    """
+    before = None if last is None else _previous(last)
+    discrete = before, pieces.begins
+    return pieces.flown.start, pieces.drive_at, pieces.joint, sharpness.flight, discrete
 
 
-def joint(model: Model, reach, before, state, t, drive, kind):
-    """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`."""
-    inner = jnp.concatenate([*_flat(flight_joint(before, state))])
+def joint(model: Model, reach, before, state, t, drive, kind, error, discrete):
+    """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`; for a
+    switch between two pieces, the gap is the distance from its surface.
+
+    **Arguments:** the `error` of a joint within a flight; the `discrete` states at the
+    end of the previous piece and at the beginning of this one, or `None` twice.
+    """
+    system = model.driven(t, drive)
+    last, first = discrete
+    found = follower(model, system, t, before, last, first, reach, error)
+    inner = jnp.concatenate([*_flat(flight_joint(found.state, state))])
+    inner = inner.at[-1].set(found.missing)
     # without an impact, the search for one must not affect the derivatives
     hit = kind == IMPACT
-    found = impact_joint(model, before, state, t, drive, reach)
+    found = impact_joint(model, before, state, t, drive, reach, discrete)
     outer = jnp.concatenate([*_flat(found)])
     return jnp.where(hit, outer, jnp.where(kind == FLIGHT, inner, 0.0))
 
@@ -320,8 +344,9 @@ def strength(sharpness: Sharpness, kind):
     joint.
     """
     error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)
+    # the distance from a switching surface is in standard errors
     flight = jnp.concatenate(
-        [sharpness.flight, jnp.full_like(sharpness.gap[..., None], jnp.inf)], axis=-1
+        [sharpness.flight, jnp.ones_like(sharpness.gap[..., None])], axis=-1
     )
     kind = kind[..., None]
     return jnp.where(

@@ -1,5 +1,6 @@
 """Score and information of every piece and joint about a point."""
 
+import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
@@ -10,6 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from ...hybrid.caches import Cache
 from ...hybrid.programs import program
+from ._discrete_states import discrete_ends
 from ._each_record import each_record, kinds, of_record
 from ._extras import Extras
 from ._fly import fly, fly_without_derivatives
@@ -37,12 +39,17 @@ _RATIO = 1e50
 
 
 class Point(NamedTuple):
-    """Values of the parameters, and states at the beginning of each piece."""
+    """Values of the parameters, and states at the beginning of each piece.
+
+    `discrete` is the index of the discrete state there, for a system with several.
+    """
 
     values: Float[Array, "r q"]
     """Values of the parameters of each recording, in their units, shape `(r, q)`."""
     states: Float[Array, "r k n"]
     """State at the beginning of each piece, shape `(r, k, n)`."""
+    discrete: Int[Array, "r k"] | None = None
+    """Discrete state at the beginning of each piece, shape `(r, k)`, or `None`."""
 
 
 class Blocks(NamedTuple):
@@ -131,7 +138,7 @@ def assemble(
 
 def _linearise_all(layout, pieces, extras, point, columns, scales):
     shown = shows_directly(layout, pieces, columns, scales)
-    every = pieces, extras, point.states, columns, scales
+    every = begun(pieces, point), extras, point.states, columns, scales
 
     def record(row):
         values, one = of_record((point.values, every), row)
@@ -180,9 +187,14 @@ def assemble_one(near, pieces, extras, states, columns, scales, shown):
     return chained(found), costs
 
 
+def begun(pieces: Pieces, point: Point) -> Pieces:
+    """Return the pieces with the discrete states in which they begin."""
+    return dataclasses.replace(pieces, begins=point.discrete)
+
+
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Predict samples in flight and in contact, and the joints, of all recordings."""
-    every = pieces, extras, point.values, point.states
+    every = begun(pieces, point), extras, point.values, point.states
 
     def record(row):
         return _predict_one(layout, *of_record(every, row))
@@ -203,10 +215,13 @@ def _predicted_one(layout, pieces, extras, values, states, substeps, flying=fly)
     end, seen = jax.vmap(lambda *a: flown(flying, model, *a, substeps=substeps))(
         states, *flight_inputs(pieces)
     )
+    last = None
+    if pieces.begins is not None:
+        last = discrete_ends(model, pieces, states).last
     resting = rested_all(model, pieces, extras)
     before = jnp.concatenate([states[:1], end[:-1]])
     joints = jax.vmap(lambda *a: joint(model, pieces.reach, *a))(
-        before, states, *joint_inputs(pieces)
+        before, states, *joint_inputs(pieces, extras.sharpness, last)
     )
     return seen, resting, joints
 
@@ -223,7 +238,8 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
     def record(pieces, extras, values, states):
         return _predicted_one(layout, pieces, extras, values, states, substeps)
 
-    seen, resting, off = jax.vmap(record)(pieces, extras, *point)
+    every = begun(pieces, point), extras, point.values, point.states
+    seen, resting, off = jax.vmap(record)(*every)
     sensors = tuple(layout.model.sensors.values())
 
     def total(part, predicted):

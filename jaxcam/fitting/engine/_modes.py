@@ -5,7 +5,8 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 
 from ...hybrid import HybridSystem, SwitchedSystem
 from ...hybrid.loop import jumping_components
@@ -41,6 +42,12 @@ class Surfaces(NamedTuple):
     number: int
     jumps: Jumps
     """The components of the field that change at each surface."""
+    remembered: Int[np.ndarray, "d k"]
+    """The sides that depend on the past, in each discrete state, shape `(d, k)`."""
+    changed: Bool[np.ndarray, "k k"]
+    """The sides that change at the crossing of each surface, shape `(k, k)`."""
+    transitions: Bool[np.ndarray, " k"]
+    """Which surfaces are transitions between modes, shape `(k,)`."""
 
     def within(self, system: HybridSystem, mode: Mode) -> InMode:
         """Return the system in one mode, without contacts."""
@@ -57,10 +64,44 @@ def surfaces_in(system: HybridSystem, t, x) -> Surfaces:
     values, static = eqx.partition(system, eqx.is_inexact_array)
     shapes, time, state = jax.eval_shape(lambda *a: a, values, t, x)
     number = jax.eval_shape(lambda s, y: surfaces(system, s, y), time, state).shape[0]
-    return Surfaces(number, jumping_components(static, shapes, time, state, number))
+    jumps = jumping_components(static, shapes, time, state, number)
+    changed = np.zeros((number, number), dtype=bool)
+    for row, places in zip(changed, system.sides_changed(number), strict=True):
+        row[list(places)] = True
+    transitions = np.arange(number) < system.one_way
+    remembered = system.remembered_sides(number)
+    return Surfaces(number, jumps, remembered, changed, transitions)
 
 
-def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
+def sides_in(known: Surfaces, system: SwitchedSystem, t, x, discrete):
+    """Return whether a motion in a discrete state is on the negative side of each
+    surface, shape `(k,)`. Without a discrete state, the system determines all sides.
+    """
+    negative = system.sides(t, x) < 0
+    if discrete is None:
+        return negative
+    row = jnp.asarray(known.remembered)[discrete]
+    # without hysteresis, the state determines the side
+    row = jnp.where(_instant(system, known.number), 0, row)
+    return jnp.where(row == 0, negative, row < 0)
+
+
+def discrete_state_of(known: Surfaces, negative: Bool[Array, " k"]) -> Int[Array, ""]:
+    """Return the index of the discrete state that a motion on these sides has."""
+    rows = known.remembered
+    same = (rows == 0) | ((rows < 0) == negative[None])
+    return jnp.argmax(jnp.all(same, axis=-1))
+
+
+def _instant(system: SwitchedSystem, number: int) -> Bool[Array, " k"]:
+    """Return which surfaces, transitions excepted, have no hysteresis."""
+    hysteresis = jnp.broadcast_to(jnp.asarray(system.hysteresis), (number,))
+    return (hysteresis <= 0) & (jnp.arange(number) >= system.one_way)
+
+
+def first_mode(
+    known: Surfaces, system: HybridSystem, t, x, duration, discrete=None
+) -> Mode:
     """Return the mode in which a piece of a motion starts.
 
     While friction holds a body at rest, the motion slides along the surface of zero
@@ -74,12 +115,14 @@ def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
         t: Time (s).
         x: State, shape `(n,)`; a velocity that is zero may have an error.
         duration: Duration of the piece (s).
+        discrete: Index of the discrete state, if it is known; otherwise the system
+            determines it.
 
     Returns:
         The mode.
     """
     assert isinstance(system, SwitchedSystem)
-    negative = system.sides(t, x) < 0
+    negative = sides_in(known, system, t, x, discrete)
     free = Mode(negative, jnp.zeros_like(negative))
     slidable = [bool(changed) for changed in known.jumps.free]
     if not any(slidable):
@@ -93,13 +136,17 @@ def first_mode(known: Surfaces, system: HybridSystem, t, x, duration) -> Mode:
     return Mode(negative, near & (held <= 0) & (slack > 0))
 
 
-def on_side_of(system: HybridSystem, t, x) -> HybridSystem:
+def on_side_of(system: HybridSystem, t, x, discrete=None) -> HybridSystem:
     """Return a system whose field is smooth near a state: the branch on the side of the
-    surfaces on which the state lies.
+    surfaces on which the state lies, in a discrete state if one is given.
     """
     if not isinstance(system, SwitchedSystem):
         return system
-    return OnSides(system, jax.lax.stop_gradient(system.sides(t, x)) < 0)
+    given = jax.lax.stop_gradient((t, x))
+    if discrete is None:
+        return OnSides(system, system.sides(*given) < 0)
+    known = surfaces_in(system, *given)
+    return OnSides(system, sides_in(known, system, *given, discrete))
 
 
 def distances_along(system: InMode, t, x, rate):
@@ -157,9 +204,9 @@ def mode_after(
     slidable = [bool(changed) for changed in known.jumps.free]
     slid = system.sliding & ends
     if not any(slidable):
-        return Mode(system.negative ^ ends, system.sliding)
+        return Mode(turned(known, system.negative, ends), system.sliding)
     turns = ends & (~slid | (beyond_shares(system, t, x) > 0.5))
-    left = Mode(system.negative ^ turns, system.sliding & ~ends)
+    left = Mode(turned(known, system.negative, turns), system.sliding & ~ends)
     _, before = _open_along(system, t, x)
     _, rate = _open_along(known.within(system.system, left), t, after)
     # static friction stops a motion that kinetic friction would not reverse
@@ -170,3 +217,9 @@ def mode_after(
     apart = jnp.broadcast_to(jnp.asarray(system.system.hysteresis), back.shape) > 0
     arrives = ends & ~slid & back & ~apart & jnp.array(slidable)
     return Mode(left.negative, left.sliding | arrives)
+
+
+def turned(known: Surfaces, negative, turns: Bool[Array, " k"]) -> Bool[Array, " k"]:
+    """Return the flags of the negative sides after crossings of surfaces."""
+    changed = jnp.any(turns[:, None] & jnp.asarray(known.changed), axis=0)
+    return negative ^ changed

@@ -9,10 +9,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...hybrid.programs import program
+from ._discrete_starts import all_discrete_ends, most_likely_starts
+from ._discrete_states import number_of_discrete_states
+from ._ends import ends_of
 from ._extras import Extras
-from ._fly import end_of_flight
 from ._layout import Layout
-from ._linearise import Point
+from ._linearise import begun, Point
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
 from ._predict import after_impact
@@ -50,6 +52,40 @@ def own_states(
     there are few samples per period, damped steps are taken from several starts: the
     point, `others`, and predictions from the neighbouring pieces. For each piece, the
     best fit is kept.
+
+    If the system has several discrete states, the states are fitted for each of them,
+    and the most likely sequence of discrete states is chosen.
+    """
+    if point.discrete is None:
+        return _fitted(layout, pieces, extras, point, others)[0]
+    size = point.states.shape[-1] - len(filtered_channels(layout.model))
+    rivals, costs, follows = [], [], []
+    for discrete in range(number_of_discrete_states(layout.model, size)):
+        first = jnp.full(pieces.joint.shape, discrete)
+        here = point._replace(discrete=first)
+        here, cost = _fitted(layout, pieces, extras, here, others, thorough=True)
+        rivals.append(np.asarray(here.states))
+        costs.append(cost)
+        follows.append(np.asarray(all_discrete_ends(layout, pieces, here).follows))
+    each = jnp.stack(costs, axis=-1), jnp.stack(follows, axis=-2)
+    first = most_likely_starts(layout, pieces, point, *each)
+    picked = np.asarray(first)[None, ..., None]
+    states = np.take_along_axis(np.stack(rivals), picked, axis=0)[0]
+    return Point(point.values, jnp.asarray(states), first)
+
+
+def _fitted(
+    layout: Layout,
+    pieces: Pieces,
+    extras: Extras,
+    point: Point,
+    others: Sequence[Float[Array, "r k n"]],
+    thorough: bool = False,
+) -> tuple[Point, Float[np.ndarray, "r k"]]:
+    """Return a point with fitted states, and the cost of each piece.
+
+    **Arguments:** as for `own_states`; `thorough` if pieces that are not far from the
+    samples also take damped steps.
     """
     # with NumPy, because JAX would compile each operation for each number of recordings
     alone = eqx.tree_at(lambda p: p.joint, pieces, np.zeros_like(pieces.joint))
@@ -57,7 +93,7 @@ def own_states(
     start = np.asarray(point.states)
 
     def about(states):
-        at = Point(point.values, jnp.asarray(states))
+        at = point._replace(states=jnp.asarray(states))
         blocks, costs = states_only(layout, alone, extras, at)
         return np.asarray(blocks.ss), np.asarray(blocks.s), np.asarray(costs.flown)
 
@@ -79,6 +115,10 @@ def own_states(
         states = np.where(wins[..., None], found, states)
         cost = np.where(wins, reached, cost)
 
+    if thorough:
+        found, reached = _descended(about, states)
+        states = np.where((reached < cost)[..., None], found, states)
+        cost = np.fmin(reached, cost)
     for start in (states, *others):
         if np.any(far()):
             offer(start)
@@ -86,13 +126,13 @@ def own_states(
     for _ in range(2):
         if not np.any(far()):
             break
-        here = Point(point.values, jnp.asarray(states))
+        here = point._replace(states=jnp.asarray(states))
         ends, landed = (np.asarray(x) for x in _ends(layout, pieces, here))
         follows = np.where((joint == IMPACT)[..., None], landed, ends)
         follows = np.concatenate([states[:, :1], follows[:, :-1]], axis=1)
         tied = ((joint == FLIGHT) | (joint == IMPACT))[..., None]
         offer(np.where(tied & np.isfinite(follows), follows, states))
-    return Point(point.values, jnp.asarray(states))
+    return point._replace(states=jnp.asarray(states)), cost
 
 
 def _descended(about, start: Float[np.ndarray, "r k n"]):
@@ -153,8 +193,7 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
         model = layout.at(values)
         size = states.shape[-1] - len(filtered_channels(model))
         part = pieces.flown
-        inputs = states, part.start, part.step, pieces.drive
-        ends = jax.vmap(lambda *a: end_of_flight(model, *a, substeps=substeps))(*inputs)
+        ends = ends_of(model, pieces, states, substeps)
         times = part.start + part.step * part.place.shape[-2]
 
         def landed(t, x, drive):
@@ -165,4 +204,4 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
         hit = jax.vmap(landed)(times, ends, last)
         return ends, hit
 
-    return jax.vmap(one)(point.values, point.states, pieces)
+    return jax.vmap(one)(point.values, point.states, begun(pieces, point))

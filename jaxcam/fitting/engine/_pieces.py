@@ -37,7 +37,7 @@ _PADDED, _LESS_PADDED, _FEW_STEPS = 64, 8, 20
 # Kinds of predecessor of a piece: none, a piece of the same flight, or an impact
 FREE, FLIGHT, IMPACT = 0, 1, 2
 # Half-width (samples) of the search for the time of an impact about the recorded one
-_REACH = 20.0
+REACH = 20.0
 
 
 class Samples(eqx.Module):
@@ -68,6 +68,8 @@ class Pieces(eqx.Module):
     - `drive_error`: standard errors of each recording's drive.
     - `substeps` `(r,)`: number of parts into which a prediction divides each step, the
         same for all recordings.
+    - `begins` `(r, k)`: index of the discrete state in which each piece begins; `None`
+        if the system has only one, or outside the compiled programs.
     """
 
     flown: Samples
@@ -81,6 +83,7 @@ class Pieces(eqx.Module):
     reach: Float[Numbers, " r"]
     drive_error: DriveError
     substeps: Int[Numbers, " r"]
+    begins: Int[Numbers, "r k"] | None = None
 
     @property
     def steps(self) -> int:
@@ -250,7 +253,7 @@ def gather(
         drive,
         begin,
         rest,
-        np.array([_REACH * part.recording.interval for part in segments]),
+        np.array([REACH * part.recording.interval for part in segments]),
         drive_error(segments, _PIECE),
         np.ones(records, dtype=int),
     )

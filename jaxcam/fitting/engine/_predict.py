@@ -176,9 +176,13 @@ def flight_joint(end, state) -> Joint:
     return Joint(state - end, jnp.zeros_like(end[0]))
 
 
-def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint:
+def impact_joint(
+    model: Model, end, state, t, drive: DriveState, reach, discrete=(None, None)
+) -> Joint:
     """Return the joint between two flights, at the time at which they have the same
     gap.
+
+    **Arguments:** among others, the `discrete` states of both flights, or `None`.
 
     No event search is needed: both flights and the impact between them are known. The
     filter of an accelerometer continues with any state, because the impact shakes it.
@@ -187,6 +191,7 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
     system = model.driven(t, drive)
 
     flights = jnp.stack([end, state])
+    both = None if discrete[1] is None else jnp.stack(discrete)
 
     def moved(model, system, flights, shift):
         """Return states, gaps and their rates for both flights at another time."""
@@ -194,14 +199,14 @@ def impact_joint(model: Model, end, state, t, drive: DriveState, reach) -> Joint
         def gap(t, x):
             return smallest_gap(system, t, x[:size])
 
-        def move(x):
-            branch = on_side_of(system, t, x[:size])
+        def move(x, discrete):
+            branch = on_side_of(system, t, x[:size], discrete)
             x = runge_kutta(model, lambda t: branch, t, x, shift)[0]
             field = augmented_field(model, branch, t + shift, x)
             along = jnp.ones_like(t), field
             return x, field, *jax.jvp(gap, (t + shift, x), along)
 
-        return jax.vmap(move)(flights)
+        return jax.vmap(move)(flights, both)
 
     def step(gaps, speeds):
         slope = speeds[1] - speeds[0]

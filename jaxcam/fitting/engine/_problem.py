@@ -56,6 +56,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from ...recordings import RecordingError, Segments
+from ._discrete_states import number_of_discrete_states
 from ._extras import Extras
 from ._input_jumps import without_jumps
 from ._known_constants import known_constants
@@ -67,7 +68,7 @@ from ._parameter import Parameter
 from ._pieces import gather, Pieces, Span
 from ._problem_checks import (
     parameter_places,
-    refuse_hysteresis,
+    refuse_many_discrete_states,
     refuse_moved_gaps,
     refuse_not_finite,
     refuse_repeated,
@@ -176,7 +177,8 @@ class Problem:
         )
         constants = known_constants(model, [part.recording for part in segments])
         parameters = (*parameters, *constants)
-        refuse_hysteresis(model)
+        discrete = number_of_discrete_states(model, state_size(model))
+        refuse_many_discrete_states(model, discrete)
         refuse_moved_gaps(model)
         refuse_switched_outputs(model)
         refuse_repeated(parameters)
@@ -205,7 +207,8 @@ class Problem:
                 steps = min(needed, _MOST_STEPS)
                 continue
             states, guess = suggested_starts(model, segments, cuts, pieces)
-            point = Point(jnp.asarray(values), jnp.asarray(states))
+            begins = jnp.zeros(pieces.joint.shape, dtype=int) if discrete > 1 else None
+            point = Point(jnp.asarray(values), jnp.asarray(states), begins)
             refuse_not_finite(layout, segments, pieces, point)
             if steps >= _MOST_STEPS:
                 break

@@ -16,6 +16,10 @@ from ._pieces import Pieces
 from ._starts import state_size
 
 
+# Largest number of discrete states of a system to fit
+_MOST_DISCRETE = 16
+
+
 def refuse_not_finite(layout: Layout, segments, pieces: Pieces, point: Point) -> None:
     """Raise `ValueError` for a vector field that is not finite near the data."""
     rates = np.asarray(_rates(layout, point, pieces))
@@ -42,27 +46,20 @@ def _rates(layout: Layout, point: Point, pieces: Pieces):
 
         return jax.vmap(at)(states, start, drive)
 
-    return jax.vmap(one)(*point, jnp.asarray(pieces.flown.start), pieces.drive_at)
+    begin = jnp.asarray(pieces.flown.start), pieces.drive_at
+    return jax.vmap(one)(point.values, point.states, *begin)
 
 
-def refuse_hysteresis(model: Model) -> None:
-    """Raise `ValueError` for a system with hysteresis or modes: its side of a surface,
-    or its mode, at the start of a piece is unknown.
+def refuse_many_discrete_states(model: Model, count: int) -> None:
+    """Raise `ValueError` for a system with more discrete states than can be tried at
+    the beginning of every piece.
     """
-    system = model.system
-    if isinstance(system, SwitchedSystem) and system.one_way:
+    if count > _MOST_DISCRETE:
         raise ValueError(
-            f"{type(system).__name__} is a hybrid automaton: a piece of a recording "
-            "does not show in which mode it begins. Fit such a system by simulations "
-            "with `jaxcam.simulate`, or state it as a `SwitchedSystem` whose sides "
-            "depend on the state alone."
-        )
-    if isinstance(system, SwitchedSystem) and np.any(np.asarray(system.hysteresis) > 0):
-        raise ValueError(
-            f"{type(system).__name__} has switching surfaces with hysteresis: between "
-            "the thresholds, a piece of a recording does not show on which side it "
-            "begins. Fit such a system with `jaxcam.simulate`, or set `hysteresis` to "
-            "zero."
+            f"{type(model.system).__name__} has {count} discrete states (modes, and "
+            f"sides of surfaces with hysteresis), and a fit tries each of them at the "
+            f"beginning of every piece of a recording; state it with at most "
+            f"{_MOST_DISCRETE}."
         )
 
 

@@ -10,7 +10,7 @@ from ...hybrid.programs import program
 from ._extras import Extras, Sharpness
 from ._fly import fly
 from ._layout import Layout
-from ._linearise import assemble, Point
+from ._linearise import assemble, begun, Point
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
 from ._predict import after_impact, smallest_gap
@@ -211,12 +211,12 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
     ends of a piece cancel those of the neighbouring pieces.
     """
 
-    def one(values, error, states, start, step, drives):
-        model = layout.at(values)
+    def one(values, states, pieces):
+        model, error, part = layout.at(values), pieces.drive_error, pieces.flown
 
-        def spread(state, start, step, drive):
+        def spread(state, start, step, drive, begin):
             def end(drive):
-                return fly(model, state, start, step, drive)[0]
+                return fly(model, state, start, step, drive, discrete=begin)[0]
 
             angle, rate, acceleration = jax.jacfwd(end)(drive)
             weights = angle - jnp.gradient(rate, axis=-1) / step
@@ -227,13 +227,12 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
                 lasting = error.unsteadiness * jnp.sum(rate, axis=-1)
             return jnp.sqrt(noise + lasting**2)
 
-        found = jax.vmap(spread)(states, start, step, drives)
+        inputs = states, part.start, part.step, pieces.drive, pieces.begins
+        found = jax.vmap(spread)(*inputs)
         return jnp.concatenate([found[:1], found[:-1]])
 
-    part = pieces.flown
-    known = point.values, pieces.drive_error, point.states, part.start, part.step
-    arrays = jax.tree.map(jnp.asarray, (*known, pieces.drive))
-    return jax.vmap(one)(*arrays)
+    arrays = jax.tree.map(jnp.asarray, begun(pieces, point))
+    return jax.vmap(one)(point.values, point.states, arrays)
 
 
 @program

@@ -131,8 +131,8 @@ def followed_by_lines(
 def _seen(layout: Layout, start, step, drive: DriveState, point: Point):
     """Return the channels at the ends of all steps but the first, `(r, k, n, c)`."""
 
-    def one(model, *piece):
-        return fly_without_derivatives(model, *piece)[1].right
+    def one(model, *piece, discrete):
+        return fly_without_derivatives(model, *piece, discrete=discrete)[1].right
 
     return _of_each(layout, (start, step, drive), point, one)
 
@@ -200,8 +200,8 @@ def _ends(layout: Layout, pieces: Pieces, point: Point, substeps):
     substeps.
     """
 
-    def one(model, *piece):
-        return end_of_flight(model, *piece, substeps=substeps)
+    def one(model, *piece, discrete):
+        return end_of_flight(model, *piece, substeps=substeps, discrete=discrete)
 
     return _of_each(layout, _flights(pieces), point, one)
 
@@ -210,13 +210,14 @@ def _ends(layout: Layout, pieces: Pieces, point: Point, substeps):
 def _off_middles(layout: Layout, pieces: Pieces, point: Point):
     """Return the largest error of the cubics in each piece and channel, `(r, k, c)`."""
 
-    def one(model, state, start, step, drive):
+    def one(model, state, start, step, drive, discrete):
         # the drive in the two halves of each step, within which drive and input are
         # linear
         twice = DriveState(*(jnp.repeat(part, 2, axis=-1) for part in drive))
         quarter = jnp.tile(jnp.array([-0.25, 0.25]), drive.angle.shape[-1]) * step
         twice = twice._replace(angle=twice.angle + quarter * twice.rate)
-        _, halves = fly_without_derivatives(model, state, start, step / 2, twice)
+        given = model, state, start, step / 2, twice
+        _, halves = fly_without_derivatives(*given, discrete=discrete)
         left, middle, right = halves.left[::2], halves.right[::2], halves.right[1::2]
         bend = (halves.left_rate[::2] - halves.right_rate[1::2]) * step / 8
         return jnp.max(jnp.abs((left + right) / 2 + bend - middle), axis=0)
@@ -231,12 +232,16 @@ def _of_each(layout: Layout, flights, point: Point, one):
     steps, and their drive.
     """
 
-    def record(values, *inputs):
+    def record(values, discrete, *inputs):
         model = layout.at(values)
-        return jax.vmap(lambda *piece: one(model, *piece))(*inputs)
+
+        def piece(begin, *piece):
+            return one(model, *piece, discrete=begin)
+
+        return jax.vmap(piece)(discrete, *inputs)
 
     arrays = jax.tree.map(jnp.asarray, flights)
-    return jax.vmap(record)(point.values, point.states, *arrays)
+    return jax.vmap(record)(point.values, point.discrete, point.states, *arrays)
 
 
 def _flights(pieces: Pieces):

@@ -44,15 +44,16 @@ def switched_flight(
     substeps,
     mode: Mode | None = None,
     events: int = EVENTS,
+    discrete=None,
 ) -> Flight:
     """Locate the events of a piece, without derivatives.
 
     **Arguments:** as for `fly`, the `mode` at the start (default: that of a motion that
-    starts there), and the maximum number of events.
+    starts there in the `discrete` state), and the maximum number of events.
     """
     given = constant((model, state, start, step, drive, mode))
     model, state, start, step, drive, mode = given
-    steps, mode = _steps(model, state, start, step, drive, mode, events)
+    steps, mode = _steps(model, state, start, step, drive, mode, events, discrete)
     found = located(steps, state, mode, substeps)
     first = _at_steps(found.parts, steps)
 
@@ -66,6 +67,21 @@ def switched_flight(
         jnp.concatenate([rates, last[None]]),
         found,
     )
+
+
+def states_and_sides(model: Model, state, start, step, drive: DriveState, discrete):
+    """Return the states at the beginnings of all steps, shape `(n, s)`, and whether the
+    motion is then on the negative side of each surface, shape `(n, k)`, without
+    derivatives.
+
+    **Arguments:** as for `switched_flight`.
+    """
+    given = model, state, start, step, drive
+    flight = switched_flight(*given, 1, discrete=discrete)
+    assert flight.located is not None
+    steps, _ = _steps(*given, flight.located.mode, EVENTS)
+    first = _at_steps(flight.located.parts, steps)
+    return first.state, first.mode.negative
 
 
 def switched_nodes(
@@ -104,26 +120,34 @@ def _last_rate(steps: Steps, found: Located, end):
     return field(steps.begin(steps.count), end)
 
 
-def switched_end(model: Model, state, start, step, drive: DriveState, substeps):
+def switched_end(
+    model: Model, state, start, step, drive: DriveState, substeps, discrete=None
+):
     """Return the state at the end, `(s,)`, without derivatives; `substeps` may be
     traced.
     """
-    return _ended(model, state, start, step, drive, substeps, EVENTS).state
+    return _ended(model, state, start, step, drive, substeps, discrete, EVENTS).state
 
 
-def has_more_events(model: Model, state, start, step, drive: DriveState, substeps):
+def has_more_events(
+    model: Model, state, start, step, drive: DriveState, substeps, discrete=None
+):
     """Return whether a piece has more events than are located; `substeps` may be
     traced.
     """
-    found = _ended(model, state, start, step, drive, substeps, EVENTS + 1)
+    most = EVENTS + 1
+    found = _ended(model, state, start, step, drive, substeps, discrete, most)
     return found.events > EVENTS
 
 
-def _ended(model: Model, state, start, step, drive: DriveState, substeps, events):
+def _ended(
+    model: Model, state, start, step, drive: DriveState, substeps, discrete, events
+):
     """Return the end of a piece, without derivatives; at most `events` events are
     located.
     """
-    steps, mode = _steps(model, state, start, step, drive, None, events)
+    given = model, state, start, step, drive
+    steps, mode = _steps(*given, None, events, discrete)
     advance = advancing(steps, substeps)
     return jax.lax.while_loop(
         lambda one: one.place < steps.count * substeps,
@@ -132,14 +156,16 @@ def _ended(model: Model, state, start, step, drive: DriveState, substeps, events
     )
 
 
-def _steps(model: Model, state, start, step, drive: DriveState, mode, events):
+def _steps(
+    model: Model, state, start, step, drive: DriveState, mode, events, discrete=None
+):
     size = state.shape[0] - len(filtered_channels(model))
     first = DriveState(*(part[0] for part in drive))
     system = model.during(start + step / 2, first)(start)
     known = surfaces_in(system, start, state[:size])
     if mode is None:
         duration = step * jnp.asarray(drive.angle.shape[0], dtype=float)
-        mode = first_mode(known, system, start, state[:size], duration)
+        mode = first_mode(known, system, start, state[:size], duration, discrete)
     return Steps(model, start, step, drive, known, size, events), mode
 
 
