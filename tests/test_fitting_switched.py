@@ -299,14 +299,6 @@ def test_pieces_that_begin_while_static_friction_holds():
     assert abs(friction.value - 1.0) < 4 * friction.stderr
 
 
-def test_hysteresis_is_refused_in_a_sentence(carts):
-    runs, _ = carts
-    model = Model(Relay(), SENSORS)
-    free = [Parameter("force", lambda m: m.system.force)]
-    with pytest.raises(ValueError, match="hysteresis: between the thresholds"):
-        Problem.build(model, segment_by_model(model, runs[:1]), free)
-
-
 def test_a_drifting_drive_of_a_switched_system_is_refused_in_a_sentence():
     with pytest.raises(ValueError, match="does not support switching surfaces"):
         Wandering(Cart())
