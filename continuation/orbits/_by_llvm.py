@@ -35,7 +35,7 @@ def evaluated_by_llvm(problem: Any, leaf: int, z) -> Evaluation | None:
 def _period(given, z):
     problem, leaf = given
     u, system = z[:-1], with_leaf(problem.parameters, leaf, z[-1])
-    return system, problem.state(u), *problem.times(u, system)
+    return system, problem.start(u, system), *problem.times(u, system)
 
 
 def _states(problem, leaf: int, z, successful: bool):

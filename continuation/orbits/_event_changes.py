@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from jaxcam.hybrid import HybridSystem, Settings, simulate
 from variational.orbits import Event, events_in_time
 
+from .._parameter import as_jax
 from ..problem import Monitor
 
 
@@ -57,6 +58,21 @@ def values_of_events(arrival: Any) -> dict[str, Float[Array, ""]]:
         found[f"pairs of {name}"] = 1.0 - 2.0 * jnp.mod(jnp.floor(number / 2), 2.0)
     found[_ORDER] = arrival.events.order
     return found
+
+
+def change_between(problem: Any, before, after) -> str | None:
+    """Return the name of the change of events between two orbits of a `SingleShooting`,
+    each given by its unknowns and parameters.
+    """
+
+    def events(u, parameters):
+        u, system = jnp.asarray(u), as_jax(parameters)
+        start, end = problem.times(u, system)
+        given = system, problem.start(u, system), start, end, problem.settings
+        return events_of(*given), float(end - start)
+
+    (first, length), (second, _) = events(*before), events(*after)
+    return name_of_change(*within_symmetry(first, second, length), length)
 
 
 def events_of(

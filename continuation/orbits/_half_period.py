@@ -25,7 +25,7 @@ class WithHalves(Unique):
             return None
         system, u = as_jax(parameters), jnp.asarray(u)
         start, end = problem.times(u, system)
-        state = problem.state(u)
+        state = problem.start(u, system)
         half = flow(system, state, start, (start + end) / 2, settings=problem.settings)
         if int(half.code):
             return None

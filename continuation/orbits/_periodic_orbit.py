@@ -278,11 +278,33 @@ def _touches(system, state, t0, length) -> bool:
 
 def _by_flow(system, guess, length, number, t0, settings):
     """Return the orbit from Newton's method on the period map, or None and a reason."""
-    found = fixed_by_flow(system, guess, length, t0, settings, free=number == 0)
+    guess, held = _held(system, guess, length, t0, settings)
+    given = system, guess, length, t0, settings
+    found = fixed_by_flow(*given, free=number == 0, held=held)
     if found is None:
         return None, "it did not converge"
     state, period = found
     return _confirmed(system, state, float(t0), period, settings)
+
+
+def _held(system, guess, length, t0, settings):
+    """Return the state after a period and the constraints that are then in contact, if
+    the motion is in contact at all times from there on; otherwise the guess.
+    """
+    end = float(t0) + length
+    turn = simulate(system, guess, t0, end, settings=settings)
+    if system.period is None or not bool(turn.successful) or not _rests(turn)[-1].any():
+        return guess, ()
+    again = simulate(system, turn.final, t0, end, settings=settings)
+    rests = _rests(again)
+    if not bool(again.successful) or not rests.any(axis=1).all():
+        return guess, ()
+    return again.final, tuple(np.flatnonzero(rests[0]).tolist())
+
+
+def _rests(run) -> np.ndarray:
+    """Return which constraints are in contact during each step, `(steps, m)`."""
+    return np.asarray(run.steps.contact)[: int(run.steps.count)]
 
 
 def _at(equations: Shooting, u, system, t0):

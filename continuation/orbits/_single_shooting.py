@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxcam.hybrid import flow, HybridSystem, Settings, SwitchedSystem
 from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.hybrid.surface import onto_contacts
 from jaxcam.parameters import AnyArray
 from variational import Orbit
 from variational.orbits import direction_of
@@ -23,18 +24,13 @@ from .._touch import Touch
 from ..problem import AbstractProblem, Monitor, StabilityKind, Start
 from ..special import FLIP, flip_direction
 from ._by_llvm import evaluated_by_llvm
-from ._event_changes import (
-    events_of,
-    monitors_of_events,
-    name_of_change,
-    values_of_events,
-    within_symmetry,
-)
+from ._event_changes import change_between, monitors_of_events, values_of_events
 from ._gap_grazing import touching
 from ._half_period import WithHalves
+from ._return_map import on_hyperplane
 from ._run_twice import shooting_twice
 from ._shooting_signature import family_of, numbers_in
-from ._start_of_period import moved_start, sampled
+from ._start_of_period import moved_start, sampled, with_held
 from ._states_at_periods import states_at_periods
 
 
@@ -94,6 +90,10 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     """
     passed: AnyArray = eqx.field(default_factory=lambda: np.zeros(()))
     """Number of grazing bifurcations that the branch has passed through."""
+    held: tuple[int, ...] = eqx.field(static=True, default=())
+    """Constraints with which an orbit is in contact at the start of its period. If it
+    is never without contact, the state is moved onto them before each simulation.
+    """
 
     @staticmethod
     def of(
@@ -114,17 +114,12 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         phase = 0.0
         if periods:
             phase = float(orbit.time) / float(system.period)  # pyright: ignore
-        problem = SingleShooting(
-            system,
-            jnp.asarray(phase),
-            jnp.asarray(x),
-            jnp.ones(len(x)),
-            settings,
-            periods,
-        )
+        given = jnp.asarray(phase), jnp.asarray(x), jnp.ones(len(x))
+        problem = SingleShooting(system, *given, settings, periods)
+        u = x if periods else np.append(x, length)
+        problem = with_held(problem, u)
         if periods:
-            return Start(problem, x)
-        u = np.append(x, length)
+            return Start(problem, u)
         return Start(problem.refreshed(u, system), u)
 
     def times(self, u, parameters) -> tuple[Array, Array]:
@@ -139,11 +134,24 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         """Return the state among the unknowns, shape `(n,)`."""
         return u if self.periods else u[:-1]
 
+    def start(self, u, parameters) -> Float[Array, " n"]:
+        """Return the state from which a simulation starts, shape `(n,)`.
+
+        It is the state among the unknowns, moved onto the constraints with which the
+        orbit is in contact.
+        """
+        if not self.held:
+            return self.state(u)
+        time, _ = self.times(u, parameters)
+        given = parameters, time, self.state(u), self.held
+        return onto_contacts(*given, self._sizes(u, parameters))
+
     def residual(self, u, parameters) -> Float[Array, " u"]:
-        x, times = self.state(u), self.times(u, parameters)
-        arrival = flow(parameters, x, *times, settings=self.settings)
-        end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
-        return self.closing(end, u, parameters)
+        return self.closing(_end(self._arrival(u, parameters)), u, parameters)
+
+    def _arrival(self, u, parameters):
+        x, times = self.start(u, parameters), self.times(u, parameters)
+        return flow(parameters, x, *times, settings=self.settings)
 
     def closing(self, end, u, parameters) -> Float[Array, " u"]:
         """Return the equations, given the state at the end of the period.
@@ -179,11 +187,9 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         if self.periods:
             return matrix
         # the last column, for the period, is the rate of change of the state
-        rate, normal = jacobian[:n, n], self.normal / self._sizes(u, parameters)
-        across = jnp.linalg.svd(normal[None])[2][1:].T
-        moved = matrix @ across
-        moved = moved - jnp.outer(rate, normal @ moved) / (normal @ rate)
-        return across.T @ moved
+        return on_hyperplane(
+            matrix, jacobian[:n, n], self.normal / self._sizes(u, parameters)
+        )
 
     def scale(self, u, parameters) -> Float[Array, " u"]:
         """Return the scales of the state components and, without forcing, the period.
@@ -216,10 +222,8 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         Returns:
             As for `AbstractProblem.seen`.
         """
-        times = self.times(u, parameters)
-        arrival = flow(parameters, self.state(u), *times, settings=self.settings)
-        found = self._all_observed(arrival, u, parameters)
-        return values_of_events(arrival), found
+        arrival = self._arrival(u, parameters)
+        return values_of_events(arrival), self._all_observed(arrival, u, parameters)
 
     def observed(self, arrival, u, parameters):
         """Return the observed quantities, except for the states at integer multiples of
@@ -236,7 +240,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
     def _all_observed(self, arrival, u, parameters):
         found = self.observed(arrival, u, parameters)
         if self.periods:
-            x, times = self.state(u), self.times(u, parameters)
+            x, times = self.start(u, parameters), self.times(u, parameters)
             found["stroboscopic"] = states_at_periods(self, x, *times, parameters)
         return found
 
@@ -252,10 +256,8 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
 
         def closed(z):
             u, parameters = z[:-1], parameters_at(z[-1])
-            times = self.times(u, parameters)
-            arrival = flow(parameters, self.state(u), *times, settings=self.settings)
-            end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
-            off = self.closing(end, u, parameters)
+            arrival = self._arrival(u, parameters)
+            off = self.closing(_end(arrival), u, parameters)
             return off, (off, arrival)
 
         whole, (off, arrival) = jax.jacfwd(closed, has_aux=True)(jnp.append(u, p))
@@ -273,15 +275,7 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
 
     def kind_of_zero(self, name: str, before, after) -> str | None:
         del name
-
-        def events(u, parameters):
-            u, parameters = jnp.asarray(u), as_jax(parameters)
-            start, end = self.times(u, parameters)
-            found = events_of(parameters, self.state(u), start, end, self.settings)
-            return found, float(end - start)
-
-        (first, length), (second, _) = events(*before), events(*after)
-        return name_of_change(*within_symmetry(first, second, length), length)
+        return change_between(self, before, after)
 
     def evaluated_on_host(self, leaf: int, z) -> Evaluation | None:
         return evaluated_by_llvm(self, leaf, z)
@@ -358,3 +352,8 @@ class SingleShooting(AbstractAtOnce, AbstractRestated):
         if found is None:
             return super().with_signature(signature)
         return dataclasses.replace(self, **found)
+
+
+def _end(arrival) -> Float[Array, " n"]:
+    """Return the state at the end of a period, NaN if the motion failed."""
+    return jnp.where(arrival.code == 0, arrival.state, jnp.nan)

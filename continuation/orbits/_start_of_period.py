@@ -7,6 +7,7 @@ event, or a transition between named modes, passes through the start of its peri
 
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxcam.hybrid import simulate, SwitchedSystem, Trajectory
@@ -52,6 +53,7 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
         return None
     later = share * problem.periods
     moved = with_field(problem, "shift", np.asarray(float(problem.shift) + later))
+    moved = with_field(moved, "held", ())
     there = _at(run, start + share * length, z)
     if before is None:
         return moved, there, None
@@ -60,6 +62,18 @@ def moved_start(problem: Any, leaf: int, z: np.ndarray, before: np.ndarray | Non
         return moved, there, None
     run, start, end = earlier
     return moved, there, there - _at(run, start + share * (end - start), before)
+
+
+def with_held(problem: Any, u: np.ndarray):
+    """Return the problem with the constraints with which the orbit is in contact at the
+    start of its period.
+    """
+    found = _run(problem, None, u) if problem.periods else None
+    if found is None:
+        return problem
+    (run, *_) = found
+    held = np.flatnonzero(np.asarray(run.steps.contact)[0])
+    return with_field(problem, "held", tuple(held.tolist()))
 
 
 def _first(events: Any, name: str):
@@ -125,7 +139,8 @@ def _run(problem: Any, leaf: int | None, z: np.ndarray):
         system, z = with_leaf(system, leaf, z[-1]), z[:-1]
     system = as_jax(system)
     start, end = (float(time) for time in problem.times(z, system))
-    run = simulate(system, z, start, end, settings=problem.settings)
+    x = problem.start(jnp.asarray(z), system)
+    run = simulate(system, x, start, end, settings=problem.settings)
     return (run, start, end) if run.successful else None
 
 

@@ -15,6 +15,7 @@ from jaxcam.hybrid.flow_jacobian import flow_jacobian, runs_by_llvm
 from jaxcam.hybrid.newton import newton_at_once, newton_on_host
 from jaxcam.hybrid.programs import program
 from jaxcam.hybrid.sizes import component_sizes
+from jaxcam.hybrid.surface import onto_contacts
 from jaxcam.parameters import as_arrays
 
 from ._builder import builder
@@ -28,13 +29,21 @@ number of corrections.
 
 
 def fixed_by_flow(
-    system, guess, length: float, t0, settings: Settings | None, free: bool
+    system,
+    guess,
+    length: float,
+    t0,
+    settings: Settings | None,
+    free: bool,
+    held: tuple[int, ...] = (),
 ) -> tuple[Any, float] | None:
     """Return the state near a guess to which the motion returns after a period, and the
     period (s), which is an unknown if it is `free`; None if there is none.
 
     Newton's method is applied to the map over one period. With an unknown period, the
-    state stays in the plane through the guess that is perpendicular to the motion.
+    state stays in the plane through the guess that is perpendicular to the motion. If
+    the motion is never without contact, its constraints are `held`: the state is moved
+    onto them before each simulation.
     """
     settings = Settings() if settings is None else settings
     normal = jnp.zeros(len(guess))
@@ -47,15 +56,17 @@ def fixed_by_flow(
         settings,
         (system, guess, t0),
         lambda: _fixed_by_llvm(
-            system, guess, start, period, settings, normal, sizes, free
+            system, guess, start, period, settings, normal, sizes, free, held
         ),
     )
     if found is None:
         state, period, success, _ = _over_period(
-            system, *given, jnp.asarray(free), jnp.array(False)
+            system, *given, jnp.asarray(free), jnp.array(False), held
         )
     else:
         state, period, success = found
+    if held:
+        state = onto_contacts(system, start, jnp.asarray(state), held, sizes)
     return (state, float(period)) if bool(success) else None
 
 
@@ -80,30 +91,36 @@ def derivatives_by_flow(system, values, where, state, t0, length, settings: Sett
 
 def _motion(given, y):
     """Return the system and the motion over a period that belong to the variables."""
-    system, where, n = given
+    system, where, n, held, sizes = given
     x, start, length, values = y[:n], y[n], y[n + 1], y[n + 2 :]
-    return builder(system, where)(values), x, start, start + length
+    built = builder(system, where)(values)
+    if held:
+        x = onto_contacts(built, start, x, held, sizes)
+    return built, x, start, start + length
 
 
-def _by_llvm(system, values, where, state, t0, length, settings):
+def _by_llvm(system, values, where, state, t0, length, settings, held=(), sizes=None):
     """Return the state after a period, and its derivatives."""
     n = len(state)
     y = np.concatenate([np.asarray(part).ravel() for part in (state, t0, length)])
     y = np.append(y, np.asarray(values))
-    arrival, whole = flow_jacobian(_motion, (system, where, n), y, settings)
+    given = system, where, n, held, sizes
+    arrival, whole = flow_jacobian(_motion, given, y, settings)
     parts = whole[:, :n], whole[:, n], whole[:, n + 1], whole[:, n + 2 :]
     end = jnp.where(arrival.code == 0, arrival.state, jnp.nan)
     return end, parts
 
 
-def _fixed_by_llvm(system, guess, t0, length, settings, normal, sizes, free: bool):
+def _fixed_by_llvm(
+    system, guess, t0, length, settings, normal, sizes, free: bool, held
+):
     """Return the fixed point, the period, and whether there is one."""
     n, guess, normal = len(guess), np.asarray(guess), np.asarray(normal)
     sizes, period = np.asarray(sizes), float(length)
 
     def evaluate(y):
         at = y[:n] * sizes, t0, y[n] * period
-        made = _by_llvm(system, np.zeros(0), None, *at, settings)
+        made = _by_llvm(system, np.zeros(0), None, *at, settings, held, sizes)
         return jax.tree.map(np.asarray, made)
 
     def equations(y, found):
@@ -124,7 +141,7 @@ def _sizes(system, t0, state, length):
 
 @program
 def _over_period(
-    system, values, where, guess, t0, length, settings, normal, free, given
+    system, values, where, guess, t0, length, settings, normal, free, given, held=()
 ):
     """Return the fixed point, the period, whether there is one, and the derivatives.
 
@@ -136,6 +153,8 @@ def _over_period(
 
     def moved(x, start, duration, p):
         end = start + duration
+        if held:
+            x = onto_contacts(build(p), start, x, held, sizes)
         state = flow(build(p), x, start, end, settings=settings).state
         return state, state
 

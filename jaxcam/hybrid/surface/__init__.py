@@ -50,6 +50,7 @@ from ._normal import (
     normal_directions as normal_directions,
     normal_velocity as normal_velocity,
 )
+from ._onto_contacts import onto_contacts as onto_contacts
 from ._release_point import (
     contact_acceleration as contact_acceleration,
     contact_state as contact_state,
