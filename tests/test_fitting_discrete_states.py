@@ -18,6 +18,7 @@ from jaxcam.fitting import (
     Doubt,
     fit,
     free_run,
+    held_out_cost,
     Model,
     Parameter,
     Problem,
@@ -117,6 +118,45 @@ class Latch(HybridAutomaton):
         return jnp.stack([state[0], -self.restitution * state[1]])
 
 
+class Cascade(HybridAutomaton):
+    """Three modes; the second one ends as soon as it begins, if its guard is negative
+    then.
+    """
+
+    modes = ("first", "second", "third")
+    transitions = (("first", "second"), ("second", "third"))
+
+    def fields(self, t, state, sides):
+        rates = jnp.array([-1.0, 5.0, -2.0])
+        return jnp.stack([jnp.broadcast_to(state[1], (3,)), rates], axis=1)
+
+    def guards(self, t, state):
+        return jnp.stack([state[0], state[1] + 0.1])
+
+
+class Listed(HybridAutomaton):
+    """Three modes whose transitions are listed in either order."""
+
+    modes = ("a", "b", "c")
+    transitions = (("a", "c"), ("b", "a"), ("a", "b"))
+
+    def fields(self, t, state, sides):
+        rates = jnp.array([-1.0, 5.0, -2.0])
+        return jnp.stack([jnp.broadcast_to(state[1], (3,)), rates], axis=1)
+
+    def guards(self, t, state):
+        found = {
+            ("a", "c"): state[0],
+            ("b", "a"): state[0] + 0.2,
+            ("a", "b"): state[1] + 9.0,
+        }
+        return jnp.stack([found[one] for one in self.transitions])
+
+
+class Reordered(Listed):
+    transitions = (("b", "a"), ("a", "c"), ("a", "b"))
+
+
 CASES = {
     "relay": (Relay, [(0.0, 0.7), (0.1, -0.3)], 12.0, 5e-3, 1e-3),
     "stick-slip": (Belt, [(0.0, 0.5), (0.6, -0.4)], 16.0, 5e-3, 1e-3),
@@ -172,7 +212,7 @@ def free(*names):
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_of_a_recorded_system_with_memory(name):
-    """Started up to 13 % off: within four standard errors, which are below 1 %."""
+    """Started up to 17 % off: within four standard errors, which are below 1 %."""
     kind, start = CASES[name][0], STARTS[name]
     runs, sensors = recorded(name)
     model, parameters = Model(kind(**start), sensors), free(*start)
@@ -274,13 +314,43 @@ def test_a_late_switch_continues_the_motion_smoothly():
 
 
 def test_a_switch_far_from_the_end_is_missed_by_its_distance():
-    """0.1 m above the threshold, with an error of 1 mm of the position: 100 errors."""
+    """0.1 m above the threshold, with an error of 1 mm of the position: 100 errors, at
+    which the residual begins to grow like the square root.
+    """
     model, none = Model(Relay(), SENSORS), jnp.zeros(())
     given = model, model.system, none, jnp.array([-0.05, 0.0])
     before, after = jnp.asarray(0), jnp.asarray(1)
     error = jnp.array([1e-3, 1.0])
     found = follower(*given, before, after, jnp.asarray(1e-6), error)
-    np.testing.assert_allclose(found.missing, 100.0, rtol=1e-4)
+    np.testing.assert_allclose(found.missing, 100.0 / 2**0.25, rtol=1e-4)
+
+
+@pytest.mark.parametrize("system", [Listed(), Reordered()])
+def test_only_a_transition_of_the_present_mode_is_missed(system):
+    """From the second mode to the first, 50 errors away, whichever transitions of
+    other modes are listed before it.
+    """
+    model, none = Model(system, SENSORS), jnp.zeros(())
+    given = model, model.system, none, jnp.array([-0.15, 0.0])
+    error = jnp.array([1e-3, 1.0])
+    modes = jnp.asarray(1), jnp.asarray(0)
+    found = follower(*given, *modes, jnp.asarray(1e-6), error)
+    np.testing.assert_allclose(found.missing, 50.0 / 1.25**0.25, rtol=1e-3)
+
+
+def test_held_out_recordings_begin_in_the_modes_that_they_show():
+    """Cost of a recording of 2400 samples that did not take part in the fit: below
+    1.1 per sample, although the fit started from a threshold of 0.11 m instead of
+    0.15 m.
+    """
+    runs, sensors = recorded("relay")
+    model = Model(Relay(force=1.1, threshold=0.11, damping=0.25), sensors)
+    parameters = free("force", "threshold", "damping")
+    segments = segment_by_model(model, runs, parameters)
+    problem = Problem.build(model, segments, parameters)
+    found = fit(problem, weights=problem.only([problem.records[0]]))
+    other = problem.only([problem.records[1]])
+    assert held_out_cost(problem, found, other) < 1.1 * len(runs[1])
 
 
 def test_a_switch_that_the_model_lacks_is_said():

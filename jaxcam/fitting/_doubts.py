@@ -179,8 +179,8 @@ def unexplained_switches(
     begins, otherwise an empty string.
     """
     weights = weights or problem.everything()
-    jumps = unexplained_jumps(problem.layout, problem.pieces, point)
-    jumps = jumps & (np.asarray(weights.flown) > 0)
+    given = problem.layout, problem.pieces, point
+    jumps = unexplained_jumps(*given, weights.flown)
     if not np.any(jumps):
         return ""
     r, k = np.argwhere(jumps)[0]

@@ -164,7 +164,7 @@ def _with_other_modes(
     problem = objective.problem
     for _ in range(_ROUNDS):
         at = problem.layout, problem.pieces, found.point
-        jumps = unexplained_jumps(*at) & (np.asarray(objective.extras.weight) > 0)
+        jumps = unexplained_jumps(*at, objective.extras.weight)
         if found.optimal and not np.any(jumps) and not _far(problem, found, weights):
             break
         start = own_states(*at[:2], objective.extras, found.point)
@@ -243,7 +243,10 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
         >>> held_out_cost(problem, found, problem.everything()) > 0
         True
     """
-    other = fit(problem, free=(), start=found, weights=weights, prior=False)
+    start = found.point
+    if start.discrete is not None:
+        start = own_states(problem.layout, problem.pieces, problem.extras, start)
+    other = fit(problem, free=(), start=start, weights=weights, prior=False)
     return other.cost
 
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from ._switched import SwitchedSystem
 from ._types import RealScalar, State
@@ -223,6 +223,17 @@ class HybridAutomaton(SwitchedSystem):
             ],
             axis=1,
         )
+
+    def met_surfaces(self, number: int) -> Bool[np.ndarray, "discrete k"]:
+        """Return which surfaces a motion can cross in each discrete state: the
+        transitions that start from its mode, and all `surfaces`.
+        """
+        others = super().remembered_sides(number - self.one_way)
+        starts = np.array([self.modes.index(before) for before, _ in self.transitions])
+        starting = starts == np.arange(len(self.modes))[:, None]
+        rows = np.repeat(starting, len(others), axis=0)
+        rest = np.ones((len(rows), number - self.one_way), dtype=bool)
+        return np.concatenate([rows, rest], axis=1)
 
     @property
     def _bits(self) -> int:

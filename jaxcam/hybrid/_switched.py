@@ -7,7 +7,7 @@ from typing import Any, Literal
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from ._system import HybridSystem
 from ._types import RealScalar, State
@@ -186,6 +186,18 @@ class SwitchedSystem(HybridSystem):
         if type(self).hysteresis is SwitchedSystem.hysteresis:
             return np.zeros((1, number), dtype=int)
         return np.array(list(itertools.product((1, -1), repeat=number)), dtype=int)
+
+    def met_surfaces(self, number: int) -> Bool[np.ndarray, "discrete k"]:
+        """Return which surfaces a motion can cross in each discrete state: by default,
+        all.
+
+        Args:
+            number: Number of surfaces, k.
+
+        Returns:
+            One row for each discrete state of `remembered_sides`.
+        """
+        return np.ones_like(self.remembered_sides(number), dtype=bool)
 
     @property
     def hysteresis(self) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
@@ -154,6 +154,10 @@ class SwitchedWrapping(Wrapping, SwitchedSystem):
     def remembered_sides(self, number: int) -> Int[np.ndarray, "discrete k"]:
         """Return the sides that depend on the past, in each discrete state."""
         return self.inner.remembered_sides(number)
+
+    def met_surfaces(self, number: int) -> Bool[np.ndarray, "discrete k"]:
+        """Return which surfaces a motion can cross in each discrete state."""
+        return self.inner.met_surfaces(number)
 
     @property
     def one_way(self) -> int:

@@ -6,6 +6,8 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Int
 
 from ._switched import SwitchedSystem
 from ._system import HybridSystem
@@ -78,6 +80,20 @@ class WithSection(Wrapping, SwitchedSystem):
         if not isinstance(self.system, SwitchedSystem):
             return super().sides_changed(number)
         return (*self.system.sides_changed(number - 1), (number - 1,))
+
+    def remembered_sides(self, number: int) -> Int[np.ndarray, "discrete k"]:
+        """Return the sides that depend on the past, in each discrete state."""
+        own = np.zeros((1, number - 1), dtype=int)
+        if isinstance(self.system, SwitchedSystem):
+            own = self.system.remembered_sides(number - 1)
+        return np.pad(own, ((0, 0), (0, 1)))
+
+    def met_surfaces(self, number: int) -> Bool[np.ndarray, "discrete k"]:
+        """Return which surfaces a motion can cross in each discrete state."""
+        own = np.ones((1, number - 1), dtype=bool)
+        if isinstance(self.system, SwitchedSystem):
+            own = self.system.met_surfaces(number - 1)
+        return np.pad(own, ((0, 0), (0, 1)), constant_values=True)
 
     @property
     def one_way(self) -> int:

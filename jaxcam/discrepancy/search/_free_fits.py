@@ -95,8 +95,7 @@ class FreeFits:
         A fit that does not fall below the cost `beaten` soon enough is stopped. The
         same fit is made only once.
         """
-        parts = np.asarray(start.values), np.asarray(start.states)
-        bits = tuple(part.tobytes() for part in parts)
+        bits = tuple(np.asarray(p).tobytes() for p in start if p is not None)
         # the problem is kept with the fit, so that its `id` is unique
         key = id(subset.problem), *subset[1:], *bits, iterations, beaten
         if key not in self._made:

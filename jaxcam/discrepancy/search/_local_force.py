@@ -18,7 +18,6 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ...fitting import engine, Problem
 from ...fitting.engine import (
-    begun,
     each_record,
     eliminate_states,
     filtered_channels,
@@ -32,6 +31,7 @@ from ...fitting.engine import (
     runge_kutta,
     shows_directly,
     states_and_sides,
+    with_begins,
 )
 from ...hybrid.programs import program
 from ...hybrid.surface import OnSides
@@ -117,7 +117,7 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     local, scales = jnp.asarray(columns.local), jnp.asarray(columns.scales)
     shown = shows_directly(problem.layout, problem.pieces, local, scales)
     extras = problem.weighted(None)
-    every = begun(problem.pieces, point), extras, point.states, local, scales
+    every = with_begins(problem.pieces, point), extras, point.states, local, scales
 
     def record(row):
         values, one = of_record((point.values, every), row)
@@ -345,7 +345,7 @@ def _motion(layout, pieces, point) -> Motion:
         inputs = states, part.start, part.step, pieces.drive, pieces.begins
         return jax.vmap(lambda *one: piece(model, *one))(*inputs)
 
-    return jax.vmap(record)(begun(pieces, point), point.values, point.states)
+    return jax.vmap(record)(with_begins(pieces, point), point.values, point.states)
 
 
 @program

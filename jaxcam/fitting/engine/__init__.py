@@ -33,7 +33,6 @@ from ._layout import Layout as Layout
 from ._linear import linear_pieces as linear_pieces, LinearPieces as LinearPieces
 from ._linearise import (
     assemble as assemble,
-    begun as begun,
     Blocks as Blocks,
     cost_by_recording as cost_by_recording,
     cost_of as cost_of,
@@ -41,6 +40,7 @@ from ._linearise import (
     Point as Point,
     predict as predict,
     total_cost as total_cost,
+    with_begins as with_begins,
 )
 from ._model import (
     augmented_field as augmented_field,

@@ -10,7 +10,7 @@ from ...hybrid.surface import gaps
 from ._discrete_states import discrete_ends
 from ._ends import ends_of
 from ._layout import Layout
-from ._linearise import begun, Point
+from ._linearise import Point, with_begins
 from ._model import DriveState
 from ._modes import on_side_of
 from ._pieces import IMPACT, Pieces
@@ -89,4 +89,4 @@ def _closing(layout: Layout, pieces: Pieces, point: Point):
         last = DriveState(*(part[:, -1] for part in pieces.drive))
         return jax.vmap(derivatives)(times, ends[:, :size], last, part.step, discrete)
 
-    return jax.vmap(one)(point.values, point.states, begun(pieces, point))
+    return jax.vmap(one)(point.values, point.states, with_begins(pieces, point))

@@ -14,12 +14,12 @@ from ._discrete_states import (
     with_late_switches,
 )
 from ._layout import Layout
-from ._linearise import begun, Point
+from ._linearise import Point, with_begins
 from ._pieces import FREE, Pieces, REACH
 
 
 def unexplained_jumps(
-    layout: Layout, pieces: Pieces, point: Point
+    layout: Layout, pieces: Pieces, point: Point, weight
 ) -> Bool[np.ndarray, "r k"]:
     """Return which pieces begin in a discrete state to which no event near the end of
     the previous piece leads: the samples show a switch that the model does not have.
@@ -28,6 +28,8 @@ def unexplained_jumps(
         layout: The location of the parameters in the model.
         pieces: The pieces of all recordings.
         point: Parameters, and states at the beginning of each piece.
+        weight: Weight of each piece, shape `(r, k)`; a piece without weight does not
+            show in which discrete state it begins or ends.
 
     Returns:
         Shape `(r, k)`; false everywhere if the system has only one discrete state.
@@ -39,7 +41,8 @@ def unexplained_jumps(
     first = np.asarray(point.discrete)
     explained = np.take_along_axis(follows[:, :-1], first[:, 1:, None], axis=2)
     jumps = np.zeros(exists.shape, dtype=bool)
-    jumps[:, 1:] = ~explained[..., 0]
+    counts = np.asarray(weight) > 0
+    jumps[:, 1:] = ~explained[..., 0] & counts[:, :-1] & counts[:, 1:]
     return jumps & exists & (np.asarray(pieces.joint) != FREE)
 
 
@@ -63,7 +66,7 @@ def _settled(layout: Layout, pieces: Pieces, point: Point):
         least = pieces.reach / REACH
         return with_late_switches(layout.at(values), pieces, states, least)
 
-    pieces = jax.tree.map(jnp.asarray, begun(pieces, point))
+    pieces = jax.tree.map(jnp.asarray, with_begins(pieces, point))
     return jax.vmap(record)(point.values, point.states, pieces)
 
 
@@ -74,7 +77,7 @@ def all_discrete_ends(layout: Layout, pieces: Pieces, point: Point) -> Ends:
     def record(values, states, pieces):
         return discrete_ends(layout.at(values), pieces, states)
 
-    pieces = jax.tree.map(jnp.asarray, begun(pieces, point))
+    pieces = jax.tree.map(jnp.asarray, with_begins(pieces, point))
     return jax.vmap(record)(point.values, point.states, pieces)
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Bool
 from ...hybrid import SwitchedSystem
 from ...hybrid.programs import program
 from ._layout import Layout
-from ._linearise import begun, Point
+from ._linearise import Point, with_begins
 from ._pieces import Pieces
 from ._problem import Problem
 from ._switched_steps import has_more_events
@@ -45,4 +45,4 @@ def _crowded(layout: Layout, pieces: Pieces, point: Point):
         inputs = states, part.start, part.step, pieces.drive, pieces.begins
         return jax.vmap(crowded)(*inputs)
 
-    return jax.vmap(record)(point.values, point.states, begun(pieces, point))
+    return jax.vmap(record)(point.values, point.states, with_begins(pieces, point))

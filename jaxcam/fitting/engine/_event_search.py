@@ -19,6 +19,11 @@ from ._modes import Mode, mode_after, state_after, Surfaces
 _SEARCH = 10
 
 
+# A guard counts as zero at the beginning of its mode if it is negative by less than
+# this fraction of its rise within a piece
+_ZERO = 0.2
+
+
 class Part(NamedTuple):
     """A part of a step: up to an event or to the end of the step."""
 
@@ -244,14 +249,14 @@ def _first_event(steps: Steps, number, t, x, mode: Mode, left, wanted) -> _Reach
 
 
 def _leaving(steps: Steps, begin, end, left) -> Bool[Array, " k"]:
-    """Return which guards are negative at the beginning only because the state has an
-    error: at their rates of change, they would be positive before the piece ends.
+    """Return which guards count as zero at the beginning, although they are negative:
+    those that rise, by much more than this within a piece.
 
     In an exact motion, such a guard is zero when its mode begins. An example is the
-    slip of a clutch that starts to slip.
+    slip of a clutch that starts to slip. In a fit, states and thresholds have errors.
 
     **Arguments:** the distances after the time `left` and at its beginning.
     """
-    duration = steps.count * steps.step
-    later = begin + (end - begin) * (duration / left)
-    return jnp.asarray(steps.surfaces.transitions) & (begin < 0) & (later >= 0)
+    rise = (end - begin) * (steps.count * steps.step / left)
+    transitions = jnp.asarray(steps.surfaces.transitions)
+    return transitions & (begin < 0) & (-begin <= _ZERO * rise)

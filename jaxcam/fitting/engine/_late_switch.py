@@ -23,6 +23,9 @@ from ._modes import discrete_state_of, sides_in, Surfaces, surfaces_in, turned
 JUMP = 30.0
 """Cost of a piece that begins in a discrete state to which no event leads: that of a
 sample whose residual is 5.5 standard deviations of the noise."""
+# Distance from a surface, in standard errors, beyond which its cost grows only in
+# proportion to the distance
+_FAR = 100.0
 # Steps of Newton's method
 _NEWTON = 4
 
@@ -44,8 +47,9 @@ class Follower(NamedTuple):
     state: Float[Array, " s"]
     """The state."""
     missing: Float[Array, ""]
-    """Distance from the surface at which the motion has to switch, in standard errors;
-    zero if it switches near the end of the piece.
+    """Distance from the surface at which the motion has to switch, in standard errors,
+    or the square root of a large distance; zero if it switches near the end of the
+    piece.
     """
 
 
@@ -53,6 +57,9 @@ def late_switches(
     model: Model, system: SwitchedSystem, t, x, negative, reach
 ) -> Switches:
     """Return the switches of a motion within the time `reach` of the end of a piece.
+
+    The motion is continued on the sides at its end, without sliding, and with the
+    measured input or drive at that time.
 
     **Arguments:** the system at time `t`, the state `(s,)` and the sides there.
     """
@@ -77,10 +84,14 @@ def late_switches(
 def leads_to(
     known: Surfaces, negative: Bool[Array, " k"]
 ) -> tuple[Bool[Array, "k k"], Int[Array, " k"]]:
-    """Return the sides after a switch at each surface, and the discrete states."""
+    """Return the sides after a switch at each surface, and the discrete states; -1 for
+    a surface at which the motion cannot switch.
+    """
     one_each = jnp.eye(known.number, dtype=bool)
     after = jax.vmap(lambda ends: turned(known, negative, ends))(one_each)
-    return after, jax.vmap(lambda row: discrete_state_of(known, row))(after)
+    reached = jax.vmap(lambda row: discrete_state_of(known, row))(after)
+    met = jnp.asarray(known.met)[discrete_state_of(known, negative)]
+    return after, jnp.where(met, reached, -1)
 
 
 def follower(
@@ -135,6 +146,8 @@ def follower(
     # a guard that depends on the time alone has no standard error
     known_error = jnp.any(leads) & (unit > 0)
     missing = distance / jnp.where(known_error, unit, 1.0)
+    # a switch that the model cannot have must not outweigh all samples
+    missing = missing / (1 + (missing / _FAR) ** 2) ** 0.25
     missing = jnp.where(known_error, missing, jnp.sqrt(JUMP))
     return Follower(
         jnp.where(jumps & jnp.any(leads), begun, end),

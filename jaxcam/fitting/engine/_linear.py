@@ -94,7 +94,7 @@ def linear_pieces(
     Examples:
         >>> from jaxcam.fitting.engine import linear_pieces
         >>> first = lambda tree: jax.tree.map(lambda leaf: leaf[0], tree)
-        >>> values, states = first(found.point)
+        >>> values, states, _ = first(found.point)
         >>> model_at = lambda change, start, step: problem.layout.at(values + change)
         >>> record = first(problem.pieces), first(problem.extras), states
         >>> made = jax.jit(lambda: linear_pieces(model_at, *record, 1, False))()
@@ -313,14 +313,15 @@ def joint_inputs(pieces: Pieces, sharpness: Sharpness, last):
     """
     before = None if last is None else _previous(last)
     discrete = before, pieces.begins
-    return pieces.flown.start, pieces.drive_at, pieces.joint, sharpness.flight, discrete
+    error = sharpness.piece
+    return pieces.flown.start, pieces.drive_at, pieces.joint, error, discrete
 
 
 def joint(model: Model, reach, before, state, t, drive, kind, error, discrete):
     """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`; for a
     switch between two pieces, the gap is the distance from its surface.
 
-    **Arguments:** the `error` of a joint within a flight; the `discrete` states at the
+    **Arguments:** the `error` of the state of a typical piece; the `discrete` states at the
     end of the previous piece and at the beginning of this one, or `None` twice.
     """
     system = model.driven(t, drive)

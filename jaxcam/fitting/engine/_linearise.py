@@ -138,7 +138,7 @@ def assemble(
 
 def _linearise_all(layout, pieces, extras, point, columns, scales):
     shown = shows_directly(layout, pieces, columns, scales)
-    every = begun(pieces, point), extras, point.states, columns, scales
+    every = with_begins(pieces, point), extras, point.states, columns, scales
 
     def record(row):
         values, one = of_record((point.values, every), row)
@@ -187,14 +187,14 @@ def assemble_one(near, pieces, extras, states, columns, scales, shown):
     return chained(found), costs
 
 
-def begun(pieces: Pieces, point: Point) -> Pieces:
+def with_begins(pieces: Pieces, point: Point) -> Pieces:
     """Return the pieces with the discrete states in which they begin."""
     return dataclasses.replace(pieces, begins=point.discrete)
 
 
 def predict(layout: Layout, pieces: Pieces, extras: Extras, point: Point):
     """Predict samples in flight and in contact, and the joints, of all recordings."""
-    every = begun(pieces, point), extras, point.values, point.states
+    every = with_begins(pieces, point), extras, point.values, point.states
 
     def record(row):
         return _predict_one(layout, *of_record(every, row))
@@ -238,7 +238,7 @@ def cost_of(layout: Layout, pieces: Pieces, extras: Extras, point: Point) -> Cos
     def record(pieces, extras, values, states):
         return _predicted_one(layout, pieces, extras, values, states, substeps)
 
-    every = begun(pieces, point), extras, point.values, point.states
+    every = with_begins(pieces, point), extras, point.values, point.states
     seen, resting, off = jax.vmap(record)(*every)
     sensors = tuple(layout.model.sensors.values())
 

@@ -44,6 +44,8 @@ class Surfaces(NamedTuple):
     """The components of the field that change at each surface."""
     remembered: Int[np.ndarray, "d k"]
     """The sides that depend on the past, in each discrete state, shape `(d, k)`."""
+    met: Bool[np.ndarray, "d k"]
+    """The surfaces that a motion can cross in each discrete state, shape `(d, k)`."""
     changed: Bool[np.ndarray, "k k"]
     """The sides that change at the crossing of each surface, shape `(k, k)`."""
     transitions: Bool[np.ndarray, " k"]
@@ -70,7 +72,8 @@ def surfaces_in(system: HybridSystem, t, x) -> Surfaces:
         row[list(places)] = True
     transitions = np.arange(number) < system.one_way
     remembered = system.remembered_sides(number)
-    return Surfaces(number, jumps, remembered, changed, transitions)
+    met = system.met_surfaces(number)
+    return Surfaces(number, jumps, remembered, met, changed, transitions)
 
 
 def sides_in(known: Surfaces, system: SwitchedSystem, t, x, discrete):

@@ -14,7 +14,7 @@ from ._discrete_states import number_of_discrete_states
 from ._ends import ends_of
 from ._extras import Extras
 from ._layout import Layout
-from ._linearise import begun, Point
+from ._linearise import Point, with_begins
 from ._model import DriveState, filtered_channels
 from ._pieces import FLIGHT, IMPACT, Pieces
 from ._predict import after_impact
@@ -58,6 +58,9 @@ def own_states(
     """
     if point.discrete is None:
         return _fitted(layout, pieces, extras, point, others)[0]
+    # the states of pieces without weight must be fitted as well, because the discrete
+    # states are compared by their costs
+    extras = extras._replace(weight=jnp.asarray(pieces.exists, dtype=float))
     size = point.states.shape[-1] - len(filtered_channels(layout.model))
     rivals, costs, follows = [], [], []
     for discrete in range(number_of_discrete_states(layout.model, size)):
@@ -128,10 +131,10 @@ def _fitted(
             break
         here = point._replace(states=jnp.asarray(states))
         ends, landed = (np.asarray(x) for x in _ends(layout, pieces, here))
-        follows = np.where((joint == IMPACT)[..., None], landed, ends)
-        follows = np.concatenate([states[:, :1], follows[:, :-1]], axis=1)
+        reached = np.where((joint == IMPACT)[..., None], landed, ends)
+        reached = np.concatenate([states[:, :1], reached[:, :-1]], axis=1)
         tied = ((joint == FLIGHT) | (joint == IMPACT))[..., None]
-        offer(np.where(tied & np.isfinite(follows), follows, states))
+        offer(np.where(tied & np.isfinite(reached), reached, states))
     return point._replace(states=jnp.asarray(states)), cost
 
 
@@ -204,4 +207,4 @@ def _ends(layout: Layout, pieces: Pieces, point: Point):
         hit = jax.vmap(landed)(times, ends, last)
         return ends, hit
 
-    return jax.vmap(one)(point.values, point.states, begun(pieces, point))
+    return jax.vmap(one)(point.values, point.states, with_begins(pieces, point))

@@ -228,6 +228,12 @@ class Problem:
         pieces = enough_substeps(layout, pieces, extras, point, longest_flight(cuts))
         pieces = jax.tree.map(jnp.asarray, pieces)
         point = own_states(layout, pieces, extras, point)
+        if discrete > 1:
+            # the discrete states are known only now
+            extras = joint_sharpness(layout, pieces, point, guess)
+            flight = longest_flight(cuts)
+            pieces = enough_substeps(layout, pieces, extras, point, flight)
+            pieces = jax.tree.map(jnp.asarray, pieces)
         return Problem(
             model,
             parameters,

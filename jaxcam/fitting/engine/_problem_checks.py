@@ -57,9 +57,10 @@ def refuse_many_discrete_states(model: Model, count: int) -> None:
     if count > _MOST_DISCRETE:
         raise ValueError(
             f"{type(model.system).__name__} has {count} discrete states (modes, and "
-            f"sides of surfaces with hysteresis), and a fit tries each of them at the "
-            f"beginning of every piece of a recording; state it with at most "
-            f"{_MOST_DISCRETE}."
+            f"sides of the surfaces of a class with `hysteresis`), and a fit tries "
+            f"each of them at the beginning of every piece of a recording. State it "
+            f"with at most {_MOST_DISCRETE}, or let `remembered_sides` return only "
+            f"the sides of the surfaces that have hysteresis."
         )
 
 

@@ -10,7 +10,7 @@ from ...hybrid.programs import program
 from ._extras import Extras, Sharpness
 from ._fly import fly
 from ._layout import Layout
-from ._linearise import assemble, begun, Point
+from ._linearise import assemble, Point, with_begins
 from ._model import augmented_field, DriveState, filtered_channels
 from ._pieces import IMPACT, Pieces
 from ._predict import after_impact, smallest_gap
@@ -231,7 +231,7 @@ def _drive_in_flight(layout: Layout, pieces: Pieces, point: Point):
         found = jax.vmap(spread)(*inputs)
         return jnp.concatenate([found[:1], found[:-1]])
 
-    arrays = jax.tree.map(jnp.asarray, begun(pieces, point))
+    arrays = jax.tree.map(jnp.asarray, with_begins(pieces, point))
     return jax.vmap(one)(point.values, point.states, arrays)
 
 

@@ -235,8 +235,8 @@ def _of_each(layout: Layout, flights, point: Point, one):
     def record(values, discrete, *inputs):
         model = layout.at(values)
 
-        def piece(begin, *piece):
-            return one(model, *piece, discrete=begin)
+        def piece(discrete, *given):
+            return one(model, *given, discrete=discrete)
 
         return jax.vmap(piece)(discrete, *inputs)
 

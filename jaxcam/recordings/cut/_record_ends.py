@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from jaxtyping import Float
 
 from ._contact_stretches import LOW, SHORTEST_FLIGHT, Span
 from ._kinks import WINDOW
@@ -12,17 +13,29 @@ from ._segments import Contact, Flight
 
 # Number of samples used to extrapolate a flight
 _LEAST = 12
+# Degree of the polynomial that describes a flight too short for this, and the fewest
+# samples on the far side of an impact in it
+_DEGREE, _FEWEST = 3, 6
+# Rms residual (in units of the noise) above which a polynomial misses an impact, and
+# below which the same polynomial with a kink describes both sides of it
+_MISSED, _DESCRIBED = 3.0, 1.5
 
 
 def clear_of_end(motion: Motion, span: Span) -> Span:
     """Return the part of a flight that is certainly before an impact at the end of the
     recording, and after one at its beginning. So close to an end, an impact affects too
-    few samples to be detected, but it can be predicted by extrapolating the flight.
+    few samples to be detected, but it can be predicted by extrapolating the flight. In
+    a flight too short for this, it is the kink of a polynomial.
     """
     first, last = span
     count = len(motion.time)
     tail = max(SHORTEST_FLIGHT + 1, round(WINDOW / motion.interval))
     if last - first < tail + _LEAST:
+        gap = motion.gap[first:last] / motion.noise
+        if first == 0 and last < count:
+            return first + _length_to_kink(gap), last
+        if last == count and first > 0:
+            return first, last - _length_to_kink(gap[::-1])
         return span
     if last == count:
         fit = motion.fit(first, last - tail, at_end=True)
@@ -35,6 +48,36 @@ def clear_of_end(motion: Motion, span: Span) -> Span:
         down = _near(motion, fit, rows)
         first = int(rows[down][-1]) + 1 if np.any(down) else first
     return first, last
+
+
+def _length_to_kink(gap: Float[np.ndarray, " k"]) -> int:
+    """Return the number of samples up to an impact near the beginning of a short
+    flight, zero without one.
+
+    **Arguments:** the gap at every sample, in units of its noise.
+    """
+    count = len(gap)
+    place = np.linspace(-1.0, 1.0, count)
+    powers = np.vander(place, _DEGREE + 1)
+    if count < _DEGREE + 3 + _FEWEST or _rms(powers, gap) < _MISSED:
+        return 0
+    best, least = 0, _DESCRIBED
+    for k in range(1, count - _FEWEST):
+        # a kink anywhere between two samples is a step and a change of slope
+        after = place >= place[k]
+        design = np.column_stack([powers, after, after * (place - place[k])])
+        rms, jump = _rms(design, gap), np.linalg.lstsq(design, gap)[0][-1]
+        # an impact sends the bodies apart
+        if rms < least and jump > 0:
+            best, least = k, rms
+    # the sample after an impact may lie on its other side
+    return best + 1 if best else 0
+
+
+def _rms(design, gap) -> float:
+    """Return the rms residual of a fit, per degree of freedom."""
+    off = gap - design @ np.linalg.lstsq(design, gap)[0]
+    return float(np.sqrt(off @ off / (len(gap) - design.shape[1])))
 
 
 def _near(motion: Motion, fit, rows):
