@@ -321,8 +321,8 @@ def joint(model: Model, reach, before, state, t, drive, kind, error, discrete):
     """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`; for a
     switch between two pieces, the gap is the distance from its surface.
 
-    **Arguments:** the `error` of the state of a typical piece; the `discrete` states at the
-    end of the previous piece and at the beginning of this one, or `None` twice.
+    **Arguments:** the `error` of the state of a typical piece; the `discrete` states at
+    the end of the previous piece and at the beginning of this one, or `None` twice.
     """
     system = model.driven(t, drive)
     last, first = discrete
