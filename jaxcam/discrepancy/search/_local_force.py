@@ -20,7 +20,6 @@ from ...fitting import engine, Problem
 from ...fitting.engine import (
     each_record,
     eliminate_states,
-    filtered_channels,
     free_columns,
     linear_pieces,
     LinearPieces,
@@ -28,16 +27,14 @@ from ...fitting.engine import (
     off_nominal,
     Point,
     prior_information,
-    runge_kutta,
     shows_directly,
-    states_and_sides,
     with_begins,
 )
 from ...hybrid.programs import program
-from ...hybrid.surface import OnSides
 from ...parameters import FloatScalar
 from ..terms import Motion, Term
 from ._blocks import Blocks
+from ._motion_of_pieces import motion_of_pieces
 
 
 # Number of nodes of a force in a piece, minus one: two per step, or fewer if steps are
@@ -125,7 +122,7 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
 
     args = problem.layout, of_record((point.values, every), 0), nodes, stride, shown
     found = each_record(record, len(columns.place), (_linear, args))
-    moved = _motion(problem.layout, problem.pieces, point)
+    moved = motion_of_pieces(problem.layout, problem.pieces, point)
     # copies, because a view would keep the motion at all nodes
     at_nodes = jax.tree.map(lambda a: np.asarray(a)[:, :, ::stride].copy(), moved)
     prior = prior_information(problem, columns, True)
@@ -297,55 +294,6 @@ def _linear(
         return eqx.tree_at(lambda m: m.system, model, system)
 
     return linear_pieces(model_at, pieces, extras, states, size + nodes, shown)
-
-
-@program
-def _motion(layout, pieces, point) -> Motion:
-    """Return the motion at the ends and the middle of every step of every piece."""
-
-    def piece(model, state, start, step, drive, discrete):
-        size = state.shape[0] - len(filtered_channels(model))
-        known = None
-        if discrete is not None:
-            given = model, state, start, step, drive
-            known = states_and_sides(*given, discrete)
-
-        def advance(x, inputs):
-            number, here, known = inputs
-            t = start + (number + jnp.array([0.0, 0.5, 1.0])) * step
-            during = free = model.during(t[1], here)
-            if known is not None:
-                x, negative = known
-                during = lambda t: OnSides(free(t), negative)
-            middle, _ = runge_kutta(model, during, t[0], x, step / 2)
-            end, _ = runge_kutta(model, during, t[1], middle, step / 2)
-            states = jnp.stack([x, middle, end])[:, :size]
-
-            def motion(t, x):
-                system = free(t)
-                base = system.base
-                if known is not None:
-                    base = OnSides(base, known[1])
-                return system.motion(t, x, field=base.vector_field(t, x))
-
-            return end, jax.vmap(motion)(t, states)
-
-        numbers = jnp.arange(drive.angle.shape[0], dtype=float)
-        _, found = jax.lax.scan(advance, state, (numbers, drive, known))
-
-        def in_order(part):
-            inner = part[:, :2].reshape(-1, *part.shape[2:])
-            return jnp.concatenate([inner, part[-1:, 2]])
-
-        return jax.tree.map(in_order, found)
-
-    def record(pieces, values, states):
-        model = layout.at(values)
-        part = pieces.flown
-        inputs = states, part.start, part.step, pieces.drive, pieces.begins
-        return jax.vmap(lambda *one: piece(model, *one))(*inputs)
-
-    return jax.vmap(record)(with_begins(pieces, point), point.values, point.states)
 
 
 @program

@@ -156,10 +156,10 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
 
     def piece(state, start, step, drive, place, begin, value, weight):
-        # outside the derivatives, because those of a loop that locates events take
-        # long to compile
+        # outside the derivatives: those of a loop that locates events compile slowly
+        model = model_at(origin, start, step)
         given = state, start, step, drive, pieces.substeps, begin
-        fine = flight_with_substeps(model_at(origin, start, step), *given)
+        fine = flight_with_substeps(model, *given)
 
         def flight(state, change):
             model = model_at(change, start, step)
@@ -179,7 +179,6 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
             (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
         else:
             (end, known), (end_rows, rows) = _columns(flight, state, origin)
-            model = model_at(origin, start, step)
             seen = sampled(model, known)
         found = score_all(sensors, value, seen)
         told = weight * found.information, weight * found.score
@@ -189,9 +188,8 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
             shares = shares_of(lambda known: sampled(model, known), known)
             by_nodes, by_sensing = rows
             normal = normal_through(by_nodes, by_sensing, shares, *told)
-        last = None
+        last = begin
         if begin is not None:
-            model = model_at(origin, start, step)
             last = last_discrete_state(model, state, start, drive, fine)
         return (end, last), end_rows, found.cost, *normal
 
@@ -311,10 +309,9 @@ def joint_inputs(pieces: Pieces, sharpness: Sharpness, last):
 
     **Arguments:** `last` is the discrete state at the end of each piece, or `None`.
     """
-    before = None if last is None else _previous(last)
-    discrete = before, pieces.begins
-    error = sharpness.piece
-    return pieces.flown.start, pieces.drive_at, pieces.joint, error, discrete
+    discrete = None if last is None else _previous(last), pieces.begins
+    given = pieces.flown.start, pieces.drive_at, pieces.joint
+    return *given, sharpness.piece, discrete
 
 
 def joint(model: Model, reach, before, state, t, drive, kind, error, discrete):
