@@ -202,9 +202,11 @@ def _integrated(steps: Steps, state, parts: Part):
         slope = jnp.where(slope < 0, slope, -jnp.inf)
         later = -(distance - jax.lax.stop_gradient(distance)) / slope
         event, at_once = jnp.any(part.ends), part.length == 0
-        # a transition whose guard is already negative takes place at the beginning
+        # a transition whose guard is far below zero takes place at the beginning; one
+        # that only just is moves as if the piece had begun earlier
         begins = at_once & (part.number == 0) & (part.offset == 0)
-        later = jnp.where(begins & (distance < 0), 0.0, later)
+        far = distance < jnp.minimum(slope, 0.0) * steps.step
+        later = jnp.where(begins & far, 0.0, later)
         # an event caused by another event shifts with it
         later = jnp.where(at_once & (moved_by[1] > 0), moved_by[0], later)
         kept = jnp.where(at_once, moved_by, 0.0)
