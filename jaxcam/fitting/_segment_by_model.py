@@ -119,13 +119,15 @@ def segment_by_model(
 
 
 class _ShownGaps(NamedTuple):
-    """The gaps that can be computed from the channels, `(g, k)`, their errors `(g,)`,
-    for each its rate of change `(k,)` if that can be computed too, the shortest period
-    of their oscillations (s), and the impacts if only a model can find them.
+    """The gaps that can be computed from the channels, `(g, k)`, their errors `(g,)`
+    and names, for each its rate of change `(k,)` if that can be computed too, the
+    shortest period of their oscillations (s), and the impacts if only a model can find
+    them.
     """
 
     gaps: Float[np.ndarray, "g k"]
     errors: Float[np.ndarray, " g"]
+    names: list[str]
     rates: list[Float[np.ndarray, " k"] | None]
     drive: Drive | None
     period: float
@@ -146,7 +148,15 @@ def _shown_gaps(model, parameters, picks, recording, drive_channel) -> _ShownGap
     period, given = shortest_period(gaps[shown], recording.interval), None
     if len(gaps) and np.all(shown):
         given = located(here, parameters, recording, gaps, errors, drive, period)
-    return _ShownGaps(gaps[shown], errors[shown], rates, drive, period, given)
+    names = [_named(model, int(k)) for k in np.flatnonzero(shown)]
+    return _ShownGaps(gaps[shown], errors[shown], names, rates, drive, period, given)
+
+
+def _named(model: Model, number: int) -> str:
+    """Return a gap in words, with the name of its constraint if it has one."""
+    names = model.system.constraint_names
+    name = f" ({names[number]})" if number < len(names) else ""
+    return f"gap {number + 1}{name}"
 
 
 def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segments:
@@ -169,6 +179,7 @@ def _segmented(model, recording, shown: _ShownGaps, restitution, spans) -> Segme
         doubted=doubted,
         rates=shown.rates,
         given=shown.given,
+        names=shown.names,
     )
 
 
@@ -184,8 +195,8 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
                 name = f"`{names[place]}`"
                 sees = f'`sees = "{names[place]}"` in the rig file, '
             raise RecordingError(
-                f"{recording.name}: gap {number + 1} depends on {name}, which no "
-                f"channel measures, so impacts cannot be found; measure it, and add a "
+                f"{recording.name}: {_named(model, number)} depends on {name}, which "
+                f"no channel measures, so impacts cannot be found; measure it, and add a "
                 f"channel for it without a bandwidth ({sees}`Sensor({place}, ...)` in "
                 f"Python)."
             )

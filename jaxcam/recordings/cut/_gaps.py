@@ -28,6 +28,7 @@ def segment_gaps(
     doubted: Sequence[tuple[int, int]] = (),
     rates: Sequence[Float[np.ndarray, " k"] | None] | None = None,
     given: GivenImpacts | None = None,
+    names: Sequence[str] = (),
 ) -> Segments:
     """Segment a recording at the impacts at each gap, given the gaps at every sample.
 
@@ -47,6 +48,7 @@ def segment_gaps(
     - `rates`: for each gap, its measured rate of change at every sample, or `None` if
         it is not measured.
     - `given`: the impacts, if a model of the flights has located them.
+    - `names`: the names of the gaps in messages, by default their numbers.
 
     **Returns:** the segments; `impacts.side` is the index of the gap that closed, and
     `impacts.before` and `impacts.after` are its rates of change.
@@ -54,7 +56,7 @@ def segment_gaps(
     **Raises:** `RecordingError` if a gap is far below zero most of the time.
     """
     sides = _sides(recording, gaps, tolerances, rates, given)
-    refuse_inside(recording.name, sides, tolerances)
+    refuse_inside(recording.name, sides, tolerances, names)
     flights, contacts, impacts = cut(sides, restitution, doubted, given)
     return Segments(
         recording,

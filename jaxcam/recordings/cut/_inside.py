@@ -16,12 +16,15 @@ _MOST = 0.5
 
 
 def refuse_inside(
-    name: str, sides: Sequence[Motion], tolerances: Sequence[float]
+    name: str,
+    sides: Sequence[Motion],
+    tolerances: Sequence[float],
+    names: Sequence[str] = (),
 ) -> None:
     """Raise `RecordingError` if the motion is inside a constraint most of the time.
 
-    **Arguments:** the `name` of the recording, the motion relative to each surface, and
-    the largest errors of the gaps.
+    **Arguments:** the `name` of the recording, the motion relative to each surface, the
+    largest errors of the gaps, and their names, by default their numbers.
     """
     deep = np.stack(
         [
@@ -37,9 +40,10 @@ def refuse_inside(
     share = float(np.mean(np.any(deep, axis=0)))
     if share <= _MOST:
         return
-    numbers = [str(k + 1) for k in np.flatnonzero(np.any(deep, axis=1))]
+    inside = np.flatnonzero(np.any(deep, axis=1))
+    found = [names[int(k)] if names else f"gap {k + 1}" for k in inside]
     raise RecordingError(
-        f"{name}: the motion is inside the constraint (gap {' and '.join(numbers)} "
+        f"{name}: the motion is inside the constraint ({' and '.join(found)} "
         f"below zero) for {share:.0%} of the recording; check the positions of the "
         "walls in the rig file, and the order, the signs and the units of the columns."
     )
