@@ -196,7 +196,7 @@ def _refuse_unseen(model: Model, picks, recording, slopes) -> None:
                 sees = f'`sees = "{names[place]}"` in the rig file, '
             raise RecordingError(
                 f"{recording.name}: {_named(model, number)} depends on {name}, which "
-                f"no channel measures, so impacts cannot be found; measure it, and add a "
-                f"channel for it without a bandwidth ({sees}`Sensor({place}, ...)` in "
-                f"Python)."
+                "no channel measures, so impacts cannot be found; measure it, and add "
+                f"a channel for it without a bandwidth ({sees}`Sensor({place}, ...)` "
+                "in Python)."
             )
