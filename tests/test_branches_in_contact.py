@@ -76,30 +76,23 @@ def test_a_branch_in_contact_takes_full_steps():
     that of the pendulum to 1e-8, and two of the multipliers are its multipliers to
     1e-6, the others zero.
     """
-    pendulum = Pendulum()
-    orbit = continuation.periodic_orbit(pendulum)
-    settings = continuation.BranchSettings(max_points=40)
-    known = continuation.branch(
-        pendulum, orbit, "amplitude", (0.1, 0.5), settings=settings
-    )
-    start = in_bowl(orbit.state)
+    start = in_bowl(continuation.periodic_orbit(Pendulum()).state)
     found = continuation.branch(
         Bowl(),
         continuation.periodic_orbit(Bowl(), start),
         "amplitude",
         (0.1, 0.5),
-        settings=settings,
+        settings=continuation.BranchSettings(max_points=40),
     )
-    ends = [branch.points[-1] for branch in (known, found)]
-    assert ends[1].parameter == pytest.approx(0.5, abs=1e-9)
+    end, known = found.points[-1], continuation.periodic_orbit(Pendulum(amplitude=0.5))
+    assert end.parameter == pytest.approx(0.5, abs=1e-9)
     assert len(found.points) <= 25
-    expected = in_bowl(ends[0].observed["state"])
-    np.testing.assert_allclose(ends[1].observed["state"], expected, atol=1e-8)
-    sizes = np.sort(np.abs(ends[1].multipliers))
+    expected = in_bowl(known.state)
+    np.testing.assert_allclose(end.observed["state"], expected, atol=1e-8)
+    sizes, wanted = (np.sort(np.abs(one.multipliers)) for one in (end, known))
     np.testing.assert_allclose(sizes[:2], 0.0, atol=1e-6)
-    wanted = np.sort(np.abs(ends[0].multipliers))
     np.testing.assert_allclose(sizes[2:], wanted, rtol=1e-6)
-    assert "held 0" in ends[1].signature
+    assert "held 0" in end.signature
 
 
 def test_the_bead_stays_in_contact_on_the_orbit():

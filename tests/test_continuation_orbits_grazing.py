@@ -256,6 +256,7 @@ def test_states_keep_their_period_if_the_start_moves(shift):
         parameters=system, periods=2, shift=shift, settings=Settings()
     )
     problem.times = lambda z, system: times
+    problem.start = lambda z, system: z
     start = np.array([-0.3, 0.1])
     rows = sampled(problem, {}, start)["stroboscopic"]
     run = simulate(system, start, *times)

@@ -27,6 +27,7 @@ from jaxcam.discrepancy.terms import (
     Where,
     WithTerms,
 )
+from jaxcam.fitting.engine import Point
 from jaxcam.models import ImpactOscillator, load_system, save_system
 
 
@@ -310,7 +311,7 @@ def test_a_fit_that_fails_with_a_new_smoothness_does_not_replace_the_one_before(
             return found.cost + 5.0
 
     subset = Subset(problem, ("first",), frozenset())  # pyright: ignore
-    start = SimpleNamespace(values=np.zeros(1), states=np.zeros(1))
+    start = Point(np.zeros(1), np.zeros(1))  # pyright: ignore
     found = Planned((), (), POLICY).fitted(subset, start, beaten=120.0)  # pyright: ignore
     assert (found.functions, found.score) == (("first",), 105.0)
 
@@ -338,7 +339,7 @@ def test_a_fit_is_made_only_once():
             return len(made)
 
     def start(value):
-        return SimpleNamespace(values=np.array([value]), states=np.zeros(2))
+        return Point(np.array([value]), np.zeros(2))  # pyright: ignore
 
     fits, problems = Counted((), (), POLICY), (SimpleNamespace(), SimpleNamespace())
     one, other = (Subset(p, ("a",), frozenset()) for p in problems)  # pyright: ignore
