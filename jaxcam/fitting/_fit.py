@@ -243,10 +243,7 @@ def held_out_cost(problem: Problem, found: Fit, weights: Weights) -> float:
         >>> held_out_cost(problem, found, problem.everything()) > 0
         True
     """
-    start = found.point
-    if start.discrete is not None:
-        start = own_states(problem.layout, problem.pieces, problem.extras, start)
-    other = fit(problem, free=(), start=start, weights=weights, prior=False)
+    other = fit(problem, free=(), start=found, weights=weights, prior=False)
     return other.cost
 
 
