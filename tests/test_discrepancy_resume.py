@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import numpy as np
 import pytest
 from fitting_rigs import NOMINAL, recorded
@@ -11,6 +12,7 @@ from jaxcam.cli import app
 from jaxcam.data import DEMO_RIG
 from jaxcam.discrepancy import diagnose, Policy
 from jaxcam.discrepancy.search._kept_trials import Ended, KeptTrials
+from jaxcam.discrepancy.terms import system_with_terms
 from jaxcam.fitting import cam_follower_model, cam_follower_parameters, Problem
 from jaxcam.recordings import segment_case
 
@@ -18,9 +20,12 @@ from jaxcam.recordings import segment_case
 @pytest.fixture(scope="module")
 def problem():
     runs = segment_case(recorded(), NOMINAL)
-    return Problem.build(
-        cam_follower_model(NOMINAL), runs, cam_follower_parameters(NOMINAL)
-    )
+    plain = cam_follower_model(NOMINAL)
+    built = Problem.build(plain, runs, cam_follower_parameters(NOMINAL))
+    # the model of a diagnosis has terms, of which the mark of a file contains all
+    system = system_with_terms(plain.system, ())
+    model = eqx.tree_at(lambda m: m.system, plain, system)
+    return dataclasses.replace(built, model=model)
 
 
 @pytest.mark.slow
@@ -33,6 +38,12 @@ def test_what_is_kept_comes_back_for_the_same_problem_only(problem, tmp_path):
     np.testing.assert_array_equal(found.point.values, problem.start.values)
     np.testing.assert_array_equal(found.point.states, problem.start.states)
     assert (found.converged, found.iterations) == (True, 7)
+    assert found.point.discrete is None
+    modes = np.arange(problem.pieces.joint.size).reshape(problem.pieces.joint.shape)
+    kept.put((), Ended(problem.start._replace(discrete=modes), True, 7))
+    again = kept.get(())
+    assert again is not None
+    np.testing.assert_array_equal(again.point.discrete, modes)
     moved = dataclasses.replace(
         problem, start=problem.start._replace(values=problem.start.values + 1e-9)
     )

@@ -13,6 +13,7 @@ from hypothesis import given, settings, strategies as st
 from jax.flatten_util import ravel_pytree
 
 import jaxcam
+from jaxcam.discrepancy import diagnose, Verdict
 from jaxcam.fitting import (
     Doubt,
     fit,
@@ -58,6 +59,16 @@ class Relay(SwitchedSystem):
     def branch(self, t, state, sides):
         push = -self.force * sides[0] - self.damping * state[1]
         return jnp.stack([state[1], push])
+
+
+class Dragged(Relay):
+    """The relay in air."""
+
+    drag: Any = number(0.15)
+
+    def branch(self, t, state, sides):
+        drag = -self.drag * state[1] * jnp.abs(state[1])
+        return super().branch(t, state, sides) + jnp.stack([jnp.zeros(()), drag])
 
 
 class Belt(HybridAutomaton):
@@ -383,3 +394,31 @@ def test_too_many_discrete_states_are_refused_in_a_sentence():
     model = Model(Many(), sensors)
     with pytest.raises(ValueError, match="Many has 32 discrete states"):
         Problem.build(model, segment_by_model(model, runs), free("force"))
+
+
+@pytest.mark.slow
+def test_a_diagnosis_of_a_relay():
+    """Quadratic drag is missing: within four standard errors."""
+    rng = np.random.default_rng(5)
+    states = (0.0, 0.7), (0.1, -0.3), (0.0, 1.2)
+    runs = [
+        record(
+            Dragged(),
+            SENSORS,
+            12.0,
+            rng=rng,
+            state=jnp.array(state),
+            interval=5e-3,
+            name=f"run{k}",
+        )
+        for k, state in enumerate(states)
+    ]
+    system = Relay(force=1.05, threshold=0.145, damping=0.28)
+    parameters = free("force", "threshold", "damping")
+    segments = segment_by_model(Model(system, SENSORS), runs, parameters)
+    found = diagnose(system, segments, sensors=SENSORS, parameters=parameters)
+    assert found.verdict is Verdict.EFFECT
+    (effect,) = found.effects
+    (drag,) = effect.parameters.values()
+    assert effect.name == "quadratic_drag"
+    assert abs(drag.value - 0.15) < 4 * drag.stderr

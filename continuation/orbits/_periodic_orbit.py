@@ -288,23 +288,20 @@ def _by_flow(system, guess, length, number, t0, settings):
 
 
 def _held(system, guess, length, t0, settings):
-    """Return the state after a period and the constraints that are then in contact, if
-    the motion is in contact at all times from there on; otherwise the guess.
+    """Return the guess, or the state one period later, and the constraints that are
+    then in contact, if the motion is in contact at all times from there on; otherwise
+    the guess and no constraints.
     """
-    end = float(t0) + length
-    turn = simulate(system, guess, t0, end, settings=settings)
-    if system.period is None or not bool(turn.successful) or not _rests(turn)[-1].any():
-        return guess, ()
-    again = simulate(system, turn.final, t0, end, settings=settings)
-    rests = _rests(again)
-    if not bool(again.successful) or not rests.any(axis=1).all():
-        return guess, ()
-    return again.final, tuple(np.flatnonzero(rests[0]).tolist())
-
-
-def _rests(run) -> np.ndarray:
-    """Return which constraints are in contact during each step, `(steps, m)`."""
-    return np.asarray(run.steps.contact)[: int(run.steps.count)]
+    state = guess
+    for _ in range(2 if system.period is not None else 0):
+        run = simulate(system, state, t0, float(t0) + length, settings=settings)
+        rests = np.asarray(run.steps.contact)[: int(run.steps.count)]
+        if not bool(run.successful) or not rests[-1].any():
+            break
+        if rests.any(axis=1).all():
+            return state, tuple(np.flatnonzero(rests[0]).tolist())
+        state = run.final
+    return guess, ()
 
 
 def _at(equations: Shooting, u, system, t0):

@@ -15,13 +15,13 @@ from ._fit_result import finish, Fit
 from ._own_value_starts import own_value_starts
 from .engine import (
     already_loose,
+    begun_before_switches,
     free_columns,
     inside,
     loosened,
     own_states,
     Point,
     Problem,
-    settled,
     unexplained_jumps,
     Weights,
 )
@@ -175,7 +175,7 @@ def _with_other_modes(
         if not better:
             break
     for _ in range(_ROUNDS):
-        start = settled(problem.layout, problem.pieces, found.point)
+        start = begun_before_switches(problem.layout, problem.pieces, found.point)
         if start is None:
             break
         again = descend(objective, start, iterations, tolerance=tolerance)

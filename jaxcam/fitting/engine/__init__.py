@@ -16,7 +16,10 @@ from ._columns import (
     sound_information as sound_information,
 )
 from ._damped_step import damped_step as damped_step
-from ._discrete_starts import settled as settled, unexplained_jumps as unexplained_jumps
+from ._discrete_starts import (
+    begun_before_switches as begun_before_switches,
+    unexplained_jumps as unexplained_jumps,
+)
 from ._discrete_states import number_of_discrete_states as number_of_discrete_states
 from ._each_record import each_record as each_record, of_record as of_record
 from ._eliminate import (

@@ -46,7 +46,7 @@ def unexplained_jumps(
     return jumps & exists & (np.asarray(pieces.joint) != FREE)
 
 
-def settled(layout: Layout, pieces: Pieces, point: Point) -> Point | None:
+def begun_before_switches(layout: Layout, pieces: Pieces, point: Point) -> Point | None:
     """Return a point at which pieces that begin before a switch also begin in the
     discrete state before it; `None` if they all do.
 
@@ -54,14 +54,14 @@ def settled(layout: Layout, pieces: Pieces, point: Point) -> Point | None:
     continued backwards from it, although the switch may have moved into the piece by
     several samples.
     """
-    states, discrete = _settled(layout, pieces, point)
+    states, discrete = _begun_before(layout, pieces, point)
     if np.array_equal(np.asarray(discrete), np.asarray(point.discrete)):
         return None
     return Point(point.values, states, discrete)
 
 
 @program
-def _settled(layout: Layout, pieces: Pieces, point: Point):
+def _begun_before(layout: Layout, pieces: Pieces, point: Point):
     def record(values, states, pieces):
         least = pieces.reach / REACH
         return with_late_switches(layout.at(values), pieces, states, least)

@@ -59,25 +59,28 @@ def _length_to_kink(gap: Float[np.ndarray, " k"]) -> int:
     count = len(gap)
     place = np.linspace(-1.0, 1.0, count)
     powers = np.vander(place, _DEGREE + 1)
-    if count < _DEGREE + 3 + _FEWEST or _rms(powers, gap) < _MISSED:
+    if count < _DEGREE + 3 + _FEWEST or _fitted(powers, gap)[0] < _MISSED:
         return 0
     best, least = 0, _DESCRIBED
     for k in range(1, count - _FEWEST):
         # a kink anywhere between two samples is a step and a change of slope
         after = place >= place[k]
         design = np.column_stack([powers, after, after * (place - place[k])])
-        rms, jump = _rms(design, gap), np.linalg.lstsq(design, gap)[0][-1]
+        rms, found = _fitted(design, gap)
         # an impact sends the bodies apart
-        if rms < least and jump > 0:
+        if rms < least and found[-1] > 0:
             best, least = k, rms
     # the sample after an impact may lie on its other side
     return best + 1 if best else 0
 
 
-def _rms(design, gap) -> float:
-    """Return the rms residual of a fit, per degree of freedom."""
-    off = gap - design @ np.linalg.lstsq(design, gap)[0]
-    return float(np.sqrt(off @ off / (len(gap) - design.shape[1])))
+def _fitted(design, gap):
+    """Return the rms residual of a linear fit, per degree of freedom, and its
+    coefficients.
+    """
+    found = np.linalg.lstsq(design, gap)[0]
+    off = gap - design @ found
+    return np.sqrt(off @ off / (len(gap) - design.shape[1])), found
 
 
 def _near(motion: Motion, fit, rows):
