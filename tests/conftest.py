@@ -1,6 +1,8 @@
 """What every test runs under: strict arrays, no windows, a shared compilation cache."""
 
+import gc
 import os
+import pkgutil
 import tempfile
 from pathlib import Path
 
@@ -11,10 +13,24 @@ import pytest
 from hypothesis import settings
 
 
+# functions of these packages are called for every operation of a traced program;
+# checking their types would double the time of the tests
+_UNCHECKED = {"jaxcam.hybrid.backend", "jaxcam.hybrid.lowering"}
+
+
+def _checked(name: str) -> list[str]:
+    """The package, or its parts except the unchecked ones."""
+    if not any(other.startswith(f"{name}.") for other in _UNCHECKED):
+        return [name] if name not in _UNCHECKED else []
+    folder = Path(__file__).parents[1].joinpath(*name.split("."))
+    inside = (module.name for module in pkgutil.iter_modules([str(folder)]))
+    return [part for one in inside for part in _checked(f"{name}.{one}")]
+
+
 # types and shapes are checked as functions are called; before any of ours is imported.
 # As Python's type system has it, an integer is a float
 jaxtyping.install_import_hook(
-    ["continuation", "jaxcam", "variational"],
+    ["continuation", "variational", *_checked("jaxcam")],
     "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))",
 )
 
@@ -41,6 +57,11 @@ def _cache_folder() -> Path:
         folder = Path(tempfile.mkdtemp(prefix="jaxcam-tests-"))
     return folder
 
+
+# tracing creates many objects, nearly all of which are kept: searching them for garbage
+# takes a sixth of the time
+gc.freeze()
+gc.set_threshold(50_000, 20, 50)
 
 _CACHE = str(_cache_folder())
 jax.config.update("jax_compilation_cache_dir", _CACHE)
