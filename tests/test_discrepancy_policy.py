@@ -172,6 +172,8 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         # how a phase is written, and the units of functions with a factor
         "_BELOW_ZERO",
         "_FACTOR_UNITS",
+        # damping of a resonance without a peak, only in words
+        "_NO_PEAK",
         # points of a table of a hidden element
         "_DECADE",
         "_STEPS",

@@ -1,5 +1,6 @@
 """The commands of `jaxcam` and its global options."""
 
+import gc
 import os
 import sys
 from typing import Annotated
@@ -17,6 +18,9 @@ from ._new_rig import new_rig
 from ._reproduce import reproduce
 from ._simulate import simulate
 
+
+# numbers of new objects, and of collections of younger objects, between collections
+_COLLECTED = (50_000, 20, 50)
 
 app = typer.Typer(
     add_completion=False,
@@ -68,6 +72,10 @@ def _options(
 
 def main() -> None:
     """Run the command given by the process arguments."""
+    # tracing programs creates many objects, nearly all of which are kept; searching
+    # them for garbage at the usual intervals takes a sixth of the time
+    gc.freeze()
+    gc.set_threshold(*_COLLECTED)
     try:
         app()
     except SystemExit as end:

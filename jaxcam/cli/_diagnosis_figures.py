@@ -1,5 +1,6 @@
 """The figures of a report of `jaxcam diagnose`."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from ..plotting.labels import labelled
 
 
 _BINS = 36
+# maximum ratio of two residuals that are drawn on axes of the same range
+_RANGES = 8.0
 
 
 def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
@@ -32,7 +35,9 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
     import matplotlib.pyplot as plt
 
     unseen, maps = (_UNSEEN, _MAPS) if changed(found) else (_UNSEEN_ALONE, _MAPS_ALONE)
-    maps = maps.format(Along(found.unseen[0]).word)
+    unseen = unseen.format("" if _one_range(_typical(found)) else _TWO_RANGES)
+    colours = _COLOURS.format(_most_of_noise(found))
+    maps = maps.format(Along(found.unseen[0]).word, colours)
     with style():
         missing = folder / "missing.png"
         functions = []
@@ -61,11 +66,12 @@ _MISSING = (
     "absorbed any part that they can represent."
 )
 _UNSEEN = (
-    "Residuals of held-out sections of one recording, that in which the missing "
-    "effects improve the prediction most, predicted one flight ahead after a fit to "
-    "the other sections: the textbook model (top), and the model with the missing "
-    "effects (bottom). The band is +-2 standard deviations of the noise."
+    "Residuals of held-out sections of one recording, that with the median improvement "
+    "by the missing effects, predicted one flight ahead after a fit to the other "
+    "sections: the textbook model (top), and the model with the missing effects "
+    "(bottom). The band is +-2 standard deviations of the noise.{}"
 )
+_TWO_RANGES = " The two axes have different ranges."
 _UNSEEN_ALONE = (
     "Residuals of held-out sections of one recording, predicted one flight ahead by "
     "the textbook model after a fit to the other sections. The band is +-2 standard "
@@ -74,31 +80,33 @@ _UNSEEN_ALONE = (
 _MAPS = (
     "Mean residual of each recording against {}, in standard errors, before (left) "
     "and after (right) the missing effects are added: flights at the top, contacts (if "
-    "any) at the bottom. For pure noise, one such map in a hundred would exceed the "
-    "colour range."
+    "any) at the bottom. {}"
 )
 _MAPS_ALONE = (
     "Mean residual of each recording against {}, in standard errors: flights at the "
-    "top, contacts (if any) at the bottom. For pure noise, one such map in a hundred "
-    "would exceed the colour range."
+    "top, contacts (if any) at the bottom. {}"
+)
+_COLOURS = (
+    "For pure noise, one such map in a hundred would exceed +-{:.2g} standard errors; "
+    "colours are linear up to this limit and logarithmic above it."
 )
 
 
 def _unseen(plt, found: Diagnosis):
-    before, after = found.unseen
+    before, _ = found.unseen
     labels = ("textbook model, refitted", "with the missing effects")
     rows = 2 if changed(found) else 1
+    both = _typical(found)
     figure, axes = plt.subplots(
         rows,
         1,
         figsize=(6.8, 0.6 + 1.8 * rows),
         sharex=True,
-        sharey=True,
+        sharey=_one_range(both),
         layout="constrained",
         squeeze=False,
     )
     axes = axes[:, 0]
-    both = max(zip(before, after), key=_improvement)
     factor, _ = shown_in(both[0])
     for axis, part, label in zip(axes, both, labels):
         for resting in sides(both):
@@ -122,6 +130,20 @@ def _unseen(plt, found: Diagnosis):
     return figure
 
 
+def _typical(found: Diagnosis) -> tuple[Residuals, Residuals]:
+    """Return the residuals before and after of the recording with the median
+    improvement.
+    """
+    pairs = sorted(zip(*found.unseen), key=_improvement)
+    return pairs[(len(pairs) - 1) // 2]
+
+
+def _one_range(pair: tuple[Residuals, Residuals]) -> bool:
+    """Return whether both residuals can be seen on axes of the same range."""
+    before, after = (float(np.max(np.abs(part.value))) for part in pair)
+    return before < _RANGES * max(after, pair[0].noise)
+
+
 def _improvement(pair: tuple[Residuals, Residuals]) -> float:
     """Return the ratio of the mean squared residuals before and after the diagnosis."""
     before, after = (float(np.mean(part.value**2)) for part in pair)
@@ -129,7 +151,7 @@ def _improvement(pair: tuple[Residuals, Residuals]) -> float:
 
 
 def _maps(plt, found: Diagnosis):
-    from scipy.stats import norm
+    from matplotlib.colors import SymLogNorm
 
     every = found.unseen[0]
     along, shown = Along(every), sides(every)
@@ -144,22 +166,21 @@ def _maps(plt, found: Diagnosis):
         squeeze=False,
     )
     names = list(dict.fromkeys(title_of(part, every) for part in every))
-    end = float(norm.isf(0.005 / (_BINS * len(names) * len(shown))))
+    maps = [
+        [_rows(parts, names, resting, along) for resting in shown]
+        for parts in found.unseen[: len(sets)]
+    ]
+    most = _most_of_noise(found)
+    end = max(most, float(np.nanmax(np.abs(maps))))
+    scale = SymLogNorm(linthresh=most, vmin=-end, vmax=end)
     image = None
-    for column, parts, which in zip(axes.T, found.unseen, sets):
-        for axis, resting in zip(column, shown):
-            rows = [
-                _binned(
-                    [p for p in parts if title_of(p, every) == name], resting, along
-                )
-                for name in names
-            ]
+    for column, of_model, which in zip(axes.T, maps, sets):
+        for axis, rows, resting in zip(column, of_model, shown):
             image = axis.imshow(
-                np.array(rows),
+                rows,
                 aspect="auto",
                 extent=(along.start, along.end, len(rows) - 0.5, -0.5),
-                vmin=-end,
-                vmax=end,
+                norm=scale,
                 cmap="RdBu_r",
                 interpolation="nearest",
             )
@@ -168,10 +189,35 @@ def _maps(plt, found: Diagnosis):
             axis.grid(False)
     for axis in axes[-1]:
         axis.set_xlabel(along.label)
-    figure.colorbar(
-        image, ax=axes, label="mean residual\n(standard errors)", extend="both"
-    )
+    bar = figure.colorbar(image, ax=axes, label="mean residual\n(standard errors)")
+    powers = 10.0 ** np.arange(math.ceil(math.log10(most)), math.log10(end) + 0.01)
+    outside = [power for power in powers if power > 1.5 * most]
+    ticks = [round(most, 1), *outside]
+    bar.set_ticks([*(-t for t in reversed(ticks)), 0.0, *ticks])
+    bar.set_ticklabels([f"{t:.3g}" for t in bar.get_ticks()])
+    bar.minorticks_off()
     return figure
+
+
+def _most_of_noise(found: Diagnosis) -> float:
+    """Return the mean residual, in standard errors, that maps of pure noise exceed once
+    in a hundred times.
+    """
+    from scipy.stats import norm
+
+    every = found.unseen[0]
+    names = {title_of(part, every) for part in every}
+    return float(norm.isf(0.005 / (_BINS * len(names) * len(sides(every)))))
+
+
+def _rows(parts: Sequence[Residuals], names, resting: bool, along: Along):
+    """Return the mean residual in each bin, with one row for each of the names."""
+    return np.array(
+        [
+            _binned([p for p in parts if title_of(p, parts) == name], resting, along)
+            for name in names
+        ]
+    )
 
 
 def _binned(parts: Sequence[Residuals], resting: bool, along: Along):

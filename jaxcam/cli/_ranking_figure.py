@@ -14,6 +14,8 @@ RANKING = (
     "next to the bar. Those to the right (blue) have a higher BIC. Differences within "
     "the grey band are too small to distinguish explanations."
 )
+# a white box that hides the grid behind a number
+_ON_PAPER = {"facecolor": "w", "edgecolor": "none", "pad": 0.8}
 # maximum length of a line of a label and of a reason (characters)
 _LABEL, _REASON = 42, 30
 
@@ -36,7 +38,7 @@ def ranking(plt, found: Diagnosis):
         axis.annotate(
             f"{delta:+.3g}", (delta, row), (-4 if better else 4, 0), va="center",
             ha="right" if better else "left", textcoords="offset points",
-            fontsize="small",
+            fontsize="small", bbox=_ON_PAPER,
         )  # fmt: skip
         if better:
             axis.annotate(

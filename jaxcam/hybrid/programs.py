@@ -20,8 +20,12 @@ T = TypeVar("T")
 # With XLA's fusion emitters, half of the compilation time is spent on one MLIR context
 # for each of several hundred fusions. The LLVM optimisation level is not reduced: below
 # level 2, a value that is needed twice may be rounded in two ways, and derivatives of
-# `min`, `max` and `clip`, which test values for equality, are then wrong.
-_OPTIONS = {"xla_cpu_use_fusion_emitters": False}
+# `min`, `max` and `clip`, which test values for equality, are then wrong. YNNPACK is
+# only used for products of matrices, because its sums over short axes are slow.
+_OPTIONS = {
+    "xla_cpu_use_fusion_emitters": False,
+    "xla_cpu_experimental_ynn_fusion_type": "LIBRARY_FUSION_TYPE_DOT",
+}
 # JAX keeps what it passed to the compiler, which needs more memory than the compiled
 # program: in a diagnosis, several hundred megabytes. These caches, and the setting
 # below, are not public; without them, a program needs more memory

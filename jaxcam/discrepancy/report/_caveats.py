@@ -33,8 +33,9 @@ def caveats_of(
         yield _masked(choice, name, share)
     for name, sentence in choice.named.imitating:
         yield _imitating(name, sentence)
+    apart = not_shared(choice, trials.policy)
     for name, share in choice.named.needed:
-        yield _named_in_doubt(trials, name, share)
+        yield _named_in_doubt(trials, name, share, bool(apart))
     for outside in choice.named.beyond:
         yield _beyond(outside)
     if not trials.settled(choice.named.found):
@@ -44,7 +45,6 @@ def caveats_of(
     direction = choice.named.direction
     if direction is not None and direction.worse <= trials.policy.tie:
         yield in_one_direction(direction)
-    apart = not_shared(choice, trials.policy)
     if apart and not (choice.differing is not None and choice.differing.complete):
         yield Caveat(
             Reason.NOT_SHARED,
@@ -296,10 +296,14 @@ def _imitating(name: str, sentence: str) -> Caveat:
     )
 
 
-def _named_in_doubt(trials: Trials, name: str, share: float) -> Caveat:
+def _named_in_doubt(trials: Trials, name: str, share: float, apart: bool) -> Caveat:
+    """Return the caveat of a term that the bootstrap does not confirm; `apart`: whether
+    a discrepancy that differs between recordings remains.
+    """
+    common = " common to all recordings" if apart else ""
     return Caveat(
         Reason.NAMED_IN_DOUBT,
-        f"The term for {spelled(name)} is named because no discrepancy "
+        f"The term for {spelled(name)} is named because no discrepancy{common} "
         f"remains with it, but {_against(trials, share)}; record more data to "
         "determine its strength.",
         (name,),

@@ -16,6 +16,8 @@ from ._words import quantity
 # A resonance is shown from a tenth of its frequency to ten times that, a relaxation for
 # five of its time constants
 _DECADE, _TIMES = 10.0, 5.0
+# Damping ratio above which the response hardly has a peak
+_NO_PEAK = 0.5
 # Integration steps of a hysteretic element between two successive points of its table
 _STEPS = 20
 
@@ -128,6 +130,12 @@ def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) 
     value = float(getattr(element, first.name))
     error = first.error(value, found[hidden.changes[0]].stderr)
     said = f"{value:.4g} +- {error:.1g}"
+    if isinstance(element, Resonator) and element.ratio > _NO_PEAK:
+        return (
+            f"a force with an internal state: an oscillator at {said} Hz, driven by "
+            f"the motion, with {float(element.ratio):.2g} of critical damping, like a "
+            "mass on a rubber mount"
+        )
     if isinstance(element, Resonator):
         return (
             f"a resonance at {said} Hz with {100 * float(element.ratio):.2g} % "
