@@ -194,6 +194,32 @@ def test_a_model_that_is_not_changed_has_no_panel_with_effects():
 
 
 @pytest.mark.usefixtures("unchecked_types")
+def test_residuals_are_seen_before_and_after():
+    """A residual one hundredth as large has its own range, and fills half of it; the
+    recording is that with the median improvement; colours reach the largest mean.
+    """
+    found = _diagnosis("effect", (EFFECT,))
+    after, *_ = found.unseen[1]
+    sizes, names = (100.0, 1.0, 3000.0), ("run1", "run2", "run3")
+    before = [
+        dataclasses.replace(after, record=name, value=size * after.value)
+        for size, name in zip(sizes, names, strict=True)
+    ]
+    same = [dataclasses.replace(after, record=name) for name in names]
+    found = dataclasses.replace(found, unseen=(before, same))
+    figure, maps = _unseen(plt, found), _maps(plt, found)
+    first, second = figure.axes
+    assert first.get_title().startswith("run1")
+    largest = np.max(np.abs(after.value))
+    for axis, most in ((first, 100 * largest), (second, largest)):
+        assert most < axis.get_ylim()[1] < 2 * most
+    image = maps.axes[0].images[0]
+    assert image.norm.vmax == pytest.approx(np.nanmax(np.abs(image.get_array())))
+    assert image.norm.vmax > 100
+    plt.close("all")
+
+
+@pytest.mark.usefixtures("unchecked_types")
 def test_only_significant_shapes_are_drawn():
     """At most four, or the largest one and the statement that it is not significant."""
     found = _diagnosis("effect", (EFFECT,))

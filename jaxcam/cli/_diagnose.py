@@ -85,7 +85,8 @@ def diagnose(
     runs, nominal = read(case, rig, files, system)
     _refuse_without_drive(nominal, propose)
     output, keep = Output(json_file, out), _kept_fits(out, resume)
-    print_summary(output, tuple(runs), nominal)
+    read_with = notes_of(runs, case)
+    print_summary(output, tuple(runs), nominal, read_with)
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
             nominal,
@@ -108,7 +109,8 @@ def diagnose(
         )
         if out is not None:
             write_verdict(out, found, figures, notes, outlook)
-    _print(output, found, notes, outlook)
+    later = [note for note in notes if note not in read_with]
+    _print(output, found, later, outlook)
     output.write_json({**found.to_json(), **outlook.data()})
     if failure is not None:
         raise failure

@@ -125,6 +125,7 @@ def _unseen(plt, found: Diagnosis):
         axis.set_title(f"{title_of(part, before)}: {label}")
         axis.set_ylabel(residual_label(part))
     axes[-1].set_xlabel("time (s)")
+    figure.align_ylabels(axes)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, markerscale=6, ncols=3, loc="outside upper right")
     return figure
@@ -194,7 +195,9 @@ def _maps(plt, found: Diagnosis):
     outside = [power for power in powers if power > 1.5 * most]
     ticks = [round(most, 1), *outside]
     bar.set_ticks([*(-t for t in reversed(ticks)), 0.0, *ticks])
-    bar.set_ticklabels([f"{t:.3g}" for t in bar.get_ticks()])
+    bar.set_ticklabels(
+        [f"{t:.3g}".replace("-", "\N{MINUS SIGN}") for t in bar.get_ticks()]
+    )
     bar.minorticks_off()
     return figure
 

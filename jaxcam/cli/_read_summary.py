@@ -17,10 +17,13 @@ _FEW = 3
 
 
 def print_summary(
-    output: Output, runs: Sequence[Recording], nominal: Rig | Setup
+    output: Output,
+    runs: Sequence[Recording],
+    nominal: Rig | Setup,
+    notes: Sequence[str] = (),
 ) -> None:
-    """Print what was read."""
-    for sentence in read_summary(runs, channels_of(nominal)):
+    """Print what was read, and notes on it."""
+    for sentence in (*read_summary(runs, channels_of(nominal)), *notes):
         output.print(sentence)
 
 

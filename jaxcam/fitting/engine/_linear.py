@@ -4,24 +4,23 @@ A joint is the condition that connects a piece with the one before it.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._chunks import in_groups
 from ._discrete_states import last_discrete_state
-from ._extras import Extras, Sharpness
+from ._extras import Extras
 from ._fly import flight_with_substeps, fly_about
-from ._late_switch import follower
+from ._joint import joint, joint_inputs, previous, strength, tied
 from ._likelihood import score_all
 from ._model import Model
-from ._pieces import FLIGHT, IMPACT, Pieces
+from ._pieces import FREE, Pieces
 from ._predict import (
     calibration,
-    flight_joint,
-    impact_joint,
     rest,
     samples,
 )
@@ -118,9 +117,11 @@ def linear_pieces(
     before = jnp.concatenate([states[:1], end[:-1]])
     turned = jnp.concatenate([jnp.zeros_like(end_rows[:1]), end_rows[:-1]])
     inputs = joint_inputs(pieces, extras.sharpness, last)
-    off, joint_rows = jax.vmap(joint_of)(before, states, *inputs)
+    joined = jnp.asarray(pieces.joint) != FREE
+    none = jnp.zeros(size + 1), jnp.zeros((size + 1, 2 * size + width))
+    off, joint_rows = in_groups(joint_of, joined, none, before, states, *inputs)
     joint_rows = joint_rows * strength(extras.sharpness, pieces.joint)[..., None]
-    shared = jnp.sqrt(jnp.minimum(extras.weight, _previous(extras.weight)))[:, None]
+    shared = jnp.sqrt(jnp.minimum(extras.weight, previous(extras.weight)))[:, None]
     earlier, later, direct = (
         rows * shared[..., None]
         for rows in (
@@ -155,50 +156,53 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
     part = pieces.flown
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
 
-    def piece(state, start, step, drive, place, begin, value, weight):
+    def piece(state, start, step, drive, place, begin, value, weight, known):
         # outside the derivatives: those of a loop that locates events compile slowly
         model = model_at(origin, start, step)
-        given = state, start, step, drive, pieces.substeps, begin
-        fine = flight_with_substeps(model, *given)
+        fine = flight_with_substeps(
+            model, state, start, step, drive, pieces.substeps, begin
+        )
 
         def flight(state, change):
             model = model_at(change, start, step)
             end, nodes = fly_about(fine, model, state, start, step, drive)
             return end, (nodes, calibration(model))
 
-        def sampled(model, known):
+        def sampled(model, given):
             along = _along(start, step, drive)
-            nodes, sensing = known
+            nodes, sensing = given
             return samples(model, nodes, sensing, start, step, place, along)
 
         def predicted(state, change):
-            end, known = flight(state, change)
-            return end, sampled(model_at(change, start, step), known)
+            end, given = flight(state, change)
+            return end, sampled(model_at(change, start, step), given)
 
         if shown:
             (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
         else:
-            (end, known), (end_rows, rows) = _columns(flight, state, origin)
-            seen = sampled(model, known)
+            (end, given), (end_rows, rows) = _columns(flight, state, origin)
+            seen = sampled(model, given)
         found = score_all(sensors, value, seen)
         told = weight * found.information, weight * found.score
         if shown:
             normal = _normal(rows, *told)
         else:
-            shares = shares_of(lambda known: sampled(model, known), known)
+            shares = shares_of(lambda given: sampled(model, given), given)
             by_nodes, by_sensing = rows
             normal = normal_through(by_nodes, by_sensing, shares, *told)
         last = begin
         if begin is not None:
             last = last_discrete_state(model, state, start, drive, fine)
-        return (end, last), end_rows, found.cost, *normal
+        cost = jnp.sum(jnp.where(known, found.cost, 0.0))
+        return (end, last), end_rows, cost, *normal
 
     weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
-    end, end_rows, costs, *normal = jax.vmap(piece)(
-        states, *flight_inputs(pieces), part.value, weight
-    )
-    cost = jnp.sum(jnp.where(part.known, costs, 0.0), axis=(1, 2, 3))
-    return end, end_rows, cost, *normal
+    size, last = states.shape[-1], None if pieces.begins is None else pieces.begins[0]
+    width = size + len(origin)
+    square, row = jnp.zeros((width, width)), jnp.zeros(width)
+    empty = (states[0], last), square[:size], jnp.zeros(()), square, row
+    given = states, *flight_inputs(pieces), part.value, weight, part.known
+    return in_groups(piece, jnp.asarray(pieces.exists), empty, *given)
 
 
 def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, origin):
@@ -302,59 +306,3 @@ def rest_inputs(pieces: Pieces, extras: Extras):
         pieces.rest_drive,
         part.place,
     )
-
-
-def joint_inputs(pieces: Pieces, sharpness: Sharpness, last):
-    """Return the arguments of `joint` after the states.
-
-    **Arguments:** `last` is the discrete state at the end of each piece, or `None`.
-    """
-    discrete = None if last is None else _previous(last), pieces.begins
-    given = pieces.flown.start, pieces.drive_at, pieces.joint
-    return *given, sharpness.piece, discrete
-
-
-def joint(model: Model, reach, before, state, t, drive, kind, error, discrete):
-    """Return the mismatches in state and gap at a joint of any kind, `(n + 1,)`; for a
-    switch between two pieces, the gap is the distance from its surface.
-
-    **Arguments:** the `error` of the state of a typical piece; the `discrete` states at
-    the end of the previous piece and at the beginning of this one, or `None` twice.
-    """
-    system = model.driven(t, drive)
-    last, first = discrete
-    found = follower(model, system, t, before, last, first, reach, error)
-    inner = jnp.concatenate([*_flat(flight_joint(found.state, state))])
-    inner = inner.at[-1].set(found.missing)
-    # without an impact, the search for one must not affect the derivatives
-    hit = kind == IMPACT
-    found = impact_joint(model, before, state, t, drive, reach, discrete)
-    outer = jnp.concatenate([*_flat(found)])
-    return jnp.where(hit, outer, jnp.where(kind == FLIGHT, inner, 0.0))
-
-
-def _flat(joint):
-    return joint.state, joint.gap[None]
-
-
-def strength(sharpness: Sharpness, kind):
-    """Return the inverse of the error of each component of a joint; zero if there is no
-    joint.
-    """
-    error = jnp.concatenate([sharpness.impact, sharpness.gap[..., None]], axis=-1)
-    # the distance from a switching surface is in standard errors
-    flight = jnp.concatenate(
-        [sharpness.flight, jnp.ones_like(sharpness.gap[..., None])], axis=-1
-    )
-    kind = kind[..., None]
-    return jnp.where(
-        kind == IMPACT, 1 / error, jnp.where(kind == FLIGHT, 1 / flight, 0.0)
-    )
-
-
-def tied(off, sharpness, kind) -> Any:
-    return off * strength(sharpness, kind)
-
-
-def _previous(array):
-    return jnp.concatenate([array[:1], array[:-1]])

@@ -15,17 +15,15 @@ from ._discrete_states import discrete_ends
 from ._each_record import each_record, kinds, of_record
 from ._extras import Extras
 from ._fly import fly, fly_without_derivatives
+from ._joint import joint, joint_inputs, tied
 from ._layout import Layout
 from ._likelihood import score_all
 from ._linear import (
     flight_inputs,
     flown,
-    joint,
-    joint_inputs,
     linear_pieces,
     LinearPieces,
     rested_all,
-    tied,
 )
 from ._pieces import Pieces
 from ._seen_directly import shows_directly

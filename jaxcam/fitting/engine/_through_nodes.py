@@ -66,8 +66,8 @@ def normal_through(
     Returns:
         Information and score of the columns.
     """
-    inner = jnp.einsum("inmc,jnmc->ncij", shares * information, shares)
-    pull = jnp.sum(shares * score, axis=2)[..., None]
+    inner = jnp.einsum("inmc,jnmc->ncij", shares * information[None], shares)
+    pull = jnp.sum(shares * score[None], axis=2)[..., None]
     each = [*nodes, *(jnp.broadcast_to(a[None], nodes.left.shape) for a in sensing)]
     # written as sums: XLA multiplies many small matrices five times as slowly
     pushed = _summed(
