@@ -11,13 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._chunks import in_groups
 from ._discrete_states import last_discrete_state
 from ._extras import Extras
 from ._fly import flight_with_substeps, fly_about
 from ._joint import joint, joint_inputs, previous, strength, tied
 from ._likelihood import score_all
 from ._model import Model
-from ._pieces import Pieces
+from ._pieces import FREE, Pieces
 from ._predict import (
     calibration,
     rest,
@@ -116,7 +117,9 @@ def linear_pieces(
     before = jnp.concatenate([states[:1], end[:-1]])
     turned = jnp.concatenate([jnp.zeros_like(end_rows[:1]), end_rows[:-1]])
     inputs = joint_inputs(pieces, extras.sharpness, last)
-    off, joint_rows = jax.vmap(joint_of)(before, states, *inputs)
+    joined = jnp.asarray(pieces.joint) != FREE
+    none = jnp.zeros(size + 1), jnp.zeros((size + 1, 2 * size + width))
+    off, joint_rows = in_groups(joint_of, joined, none, before, states, *inputs)
     joint_rows = joint_rows * strength(extras.sharpness, pieces.joint)[..., None]
     shared = jnp.sqrt(jnp.minimum(extras.weight, previous(extras.weight)))[:, None]
     earlier, later, direct = (
@@ -153,50 +156,53 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
     part = pieces.flown
     sensors = tuple(model_at(origin, 0.0, 1.0).sensors.values())
 
-    def piece(state, start, step, drive, place, begin, value, weight):
+    def piece(state, start, step, drive, place, begin, value, weight, known):
         # outside the derivatives: those of a loop that locates events compile slowly
         model = model_at(origin, start, step)
-        given = state, start, step, drive, pieces.substeps, begin
-        fine = flight_with_substeps(model, *given)
+        fine = flight_with_substeps(
+            model, state, start, step, drive, pieces.substeps, begin
+        )
 
         def flight(state, change):
             model = model_at(change, start, step)
             end, nodes = fly_about(fine, model, state, start, step, drive)
             return end, (nodes, calibration(model))
 
-        def sampled(model, known):
+        def sampled(model, given):
             along = _along(start, step, drive)
-            nodes, sensing = known
+            nodes, sensing = given
             return samples(model, nodes, sensing, start, step, place, along)
 
         def predicted(state, change):
-            end, known = flight(state, change)
-            return end, sampled(model_at(change, start, step), known)
+            end, given = flight(state, change)
+            return end, sampled(model_at(change, start, step), given)
 
         if shown:
             (end, seen), (end_rows, rows) = _columns(predicted, state, origin)
         else:
-            (end, known), (end_rows, rows) = _columns(flight, state, origin)
-            seen = sampled(model, known)
+            (end, given), (end_rows, rows) = _columns(flight, state, origin)
+            seen = sampled(model, given)
         found = score_all(sensors, value, seen)
         told = weight * found.information, weight * found.score
         if shown:
             normal = _normal(rows, *told)
         else:
-            shares = shares_of(lambda known: sampled(model, known), known)
+            shares = shares_of(lambda given: sampled(model, given), given)
             by_nodes, by_sensing = rows
             normal = normal_through(by_nodes, by_sensing, shares, *told)
         last = begin
         if begin is not None:
             last = last_discrete_state(model, state, start, drive, fine)
-        return (end, last), end_rows, found.cost, *normal
+        cost = jnp.sum(jnp.where(known, found.cost, 0.0))
+        return (end, last), end_rows, cost, *normal
 
     weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
-    end, end_rows, costs, *normal = jax.vmap(piece)(
-        states, *flight_inputs(pieces), part.value, weight
-    )
-    cost = jnp.sum(jnp.where(part.known, costs, 0.0), axis=(1, 2, 3))
-    return end, end_rows, cost, *normal
+    size, last = states.shape[-1], None if pieces.begins is None else pieces.begins[0]
+    width = size + len(origin)
+    square, row = jnp.zeros((width, width)), jnp.zeros(width)
+    empty = (states[0], last), square[:size], jnp.zeros(()), square, row
+    given = states, *flight_inputs(pieces), part.value, weight, part.known
+    return in_groups(piece, jnp.asarray(pieces.exists), empty, *given)
 
 
 def _linear_contacts(model_at: Callable[..., Model], pieces: Pieces, extras, origin):
