@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ._chunks import in_groups
 from ._discrete_states import last_discrete_state
 from ._extras import Extras
 from ._fly import flight_with_substeps, fly_about
+from ._groups import in_groups
 from ._joint import joint, joint_inputs, previous, strength, tied
 from ._likelihood import score_all
 from ._model import Model
