@@ -190,8 +190,16 @@ def _maps(plt, found: Diagnosis):
             axis.grid(False)
     for axis in axes[-1]:
         axis.set_xlabel(along.label)
+    _colour_bar(figure, image, axes, most)
+    return figure
+
+
+def _colour_bar(figure, image, axes, most: float) -> None:
+    """Draw a colour bar with ticks at the limits `most` of its linear part."""
     bar = figure.colorbar(image, ax=axes, label="mean residual\n(standard errors)")
-    powers = 10.0 ** np.arange(math.ceil(math.log10(most)), math.log10(end) + 0.01)
+    powers = 10.0 ** np.arange(
+        math.ceil(math.log10(most)), math.log10(image.norm.vmax) + 0.01
+    )
     outside = [power for power in powers if power > 1.5 * most]
     ticks = [round(most, 1), *outside]
     bar.set_ticks([*(-t for t in reversed(ticks)), 0.0, *ticks])
@@ -199,7 +207,6 @@ def _maps(plt, found: Diagnosis):
         [f"{t:.3g}".replace("-", "\N{MINUS SIGN}") for t in bar.get_ticks()]
     )
     bar.minorticks_off()
-    return figure
 
 
 def _most_of_noise(found: Diagnosis) -> float:
