@@ -85,8 +85,8 @@ def diagnose(
     runs, nominal = read(case, rig, files, system)
     _refuse_without_drive(nominal, propose)
     output, keep = Output(json_file, out), _kept_fits(out, resume)
-    read_with = notes_of(runs, case)
-    print_summary(output, tuple(runs), nominal, read_with)
+    said = notes_of(runs, case)
+    print_summary(output, tuple(runs), nominal, said)
     with progress("finding impacts and contacts") as report:
         found = discrepancy.diagnose(
             nominal,
@@ -98,9 +98,7 @@ def diagnose(
             keep=keep,
             policy=_policy(minutes),
         )
-        # the segmentation may add a note to a recording
-        used = (part.recording for part in found.after.problem.segments)
-        notes, figures = notes_of([*runs, *used], case), []
+        notes, figures = notes_of(_recordings(runs, found), case), []
         if out is not None:
             report("drawing", None)
             figures = write_diagnosis(out, found, notes)
@@ -109,11 +107,15 @@ def diagnose(
         )
         if out is not None:
             write_verdict(out, found, figures, notes, outlook)
-    later = [note for note in notes if note not in read_with]
-    _print(output, found, later, outlook)
+    _print(output, found, [note for note in notes if note not in said], outlook)
     output.write_json({**found.to_json(), **outlook.data()})
     if failure is not None:
         raise failure
+
+
+def _recordings(runs, found):
+    """Return the recordings as read, and as segmented, which may add notes."""
+    return [*runs, *(part.recording for part in found.after.problem.segments)]
 
 
 def _refuse_without_drive(nominal, propose: bool) -> None:

@@ -86,8 +86,8 @@ def fit(
 
     runs, nominal = read(case, rig, files, system)
     output = Output(json_file, out)
-    read_with = notes_of(runs, case)
-    print_summary(output, tuple(runs), nominal, read_with)
+    said = notes_of(runs, case)
+    print_summary(output, tuple(runs), nominal, said)
     with progress("finding impacts and contacts") as report:
         found = fitted(runs, nominal, bootstrap, iterations, report)
         figures = []
@@ -96,7 +96,7 @@ def fit(
             figures = draw(out, found.before, found.after)
     # the segmentation may add a note to a recording
     notes = notes_of([*runs, *(part.recording for part in found.segments)], case)
-    print_fit(output, found, [note for note in notes if note not in read_with])
+    print_fit(output, found, [note for note in notes if note not in said])
     output.print_figures(figures)
     about = {"case": runs.name, "notes": list(notes), "figures": figures}
     written = found.to_json(about)
