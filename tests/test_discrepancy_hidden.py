@@ -2,6 +2,8 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import equinox as eqx
 import hidden_state_rig as truth
@@ -12,7 +14,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxcam import simulate
-from jaxcam.discrepancy.report._hidden import _argument, hidden_formula
+from jaxcam.discrepancy.report._hidden import (
+    _argument,
+    hidden_formula,
+    hidden_words,
+)
 from jaxcam.discrepancy.search._hidden_kinds import (
     HYSTERESIS,
     RELAXATION,
@@ -306,3 +312,18 @@ def test_the_table_of_a_narrow_resonance_contains_its_peak():
     peak = float(jnp.abs(one.transfer(jnp.asarray(14.0))))
     shown = np.max(np.abs(jax.vmap(one.transfer)(jnp.asarray(along))))
     assert shown == pytest.approx(peak, rel=1e-3)
+
+
+@pytest.mark.usefixtures("unchecked_types")
+@pytest.mark.parametrize(("ratio", "resonance"), [(0.04, True), (0.7, False)])
+def test_what_hardly_has_a_peak_is_no_resonance(ratio, resonance):
+    """With 70 % damping, the transfer function has a peak of 2 %."""
+    number = SimpleNamespace(name="frequency", error=lambda value, error: error)
+    hidden: Any = SimpleNamespace(
+        kind=SimpleNamespace(numbers=(number,)), changes=("change",)
+    )
+    found: Any = {"change": SimpleNamespace(stderr=0.5)}
+    one = Resonator(frequency=17.26, ratio=ratio, by_state=900.0)
+    said = hidden_words(found, hidden, one, "m")
+    assert "17.26 +- 0.5 Hz" in said
+    assert said.startswith("a resonance") == resonance
