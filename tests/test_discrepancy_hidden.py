@@ -317,7 +317,7 @@ def test_the_table_of_a_narrow_resonance_contains_its_peak():
 @pytest.mark.usefixtures("unchecked_types")
 @pytest.mark.parametrize(("ratio", "resonance"), [(0.04, True), (0.7, False)])
 def test_what_hardly_has_a_peak_is_no_resonance(ratio, resonance):
-    """With 70 % damping, the transfer function has a peak of 2 %."""
+    """With 70 % damping, the peak is 0.02 % higher than the response at rest."""
     number = SimpleNamespace(name="frequency", error=lambda value, error: error)
     hidden: Any = SimpleNamespace(
         kind=SimpleNamespace(numbers=(number,)), changes=("change",)
