@@ -23,7 +23,8 @@ def _checked(name: str) -> list[str]:
     if not any(other.startswith(f"{name}.") for other in _UNCHECKED):
         return [name] if name not in _UNCHECKED else []
     folder = Path(__file__).parents[1].joinpath(*name.split("."))
-    inside = (module.name for module in pkgutil.iter_modules([str(folder)]))
+    inside = [module.name for module in pkgutil.iter_modules([str(folder)])]
+    assert inside, folder
     return [part for one in inside for part in _checked(f"{name}.{one}")]
 
 

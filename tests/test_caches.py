@@ -1,5 +1,7 @@
 """What is traced and compiled once, and how it is forgotten."""
 
+import gc
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 import jaxcam
 from jaxcam.hybrid import flow, HybridSystem
-from jaxcam.hybrid.caches import Cache
+from jaxcam.hybrid.caches import _Collector, Cache
 
 
 def field(rate):
@@ -115,3 +117,17 @@ def test_a_parameter_changed_in_place_is_checked_again():
     ball.load[0] = float("nan")
     with pytest.raises(ValueError, match="not finite"):
         jaxcam.simulate(ball, [1.0, 0.0], 0.0, 0.1)
+
+
+def test_the_garbage_collector_resumes_after_the_last_of_several_threads():
+    """Also if the thread that suspended it first ends first, and if a trace fails."""
+    collector = _Collector()
+    first, second = collector.suspended(), collector.suspended()
+    first.__enter__(), second.__enter__()
+    first.__exit__(None, None, None)
+    assert not gc.isenabled()
+    second.__exit__(None, None, None)
+    assert gc.isenabled()
+    with pytest.raises(ZeroDivisionError):
+        Cache().get("key", lambda: 1 / 0)
+    assert gc.isenabled()

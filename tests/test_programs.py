@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxcam.hybrid import programs
 from jaxcam.hybrid.programs import _PASSED, is_tracing, program
 
 
@@ -77,3 +78,10 @@ def test_tracing_is_known():
     jax.vmap(look)(jnp.ones(2))
     look(1.0)
     assert seen == [True, False, False, False]
+
+
+def test_a_version_of_xla_may_lack_an_option(monkeypatch):
+    """The program then runs without options."""
+    monkeypatch.setattr(programs, "_OPTIONS", {"xla_cpu_no_such_option": True})
+    square = program(lambda x: x * x)
+    assert [float(square(jnp.asarray(x))) for x in (3.0, 4.0)] == [9.0, 16.0]

@@ -74,7 +74,7 @@ def main() -> None:
     """Run the command given by the process arguments."""
     # tracing programs creates many objects, nearly all of which are kept; searching
     # them for garbage at the usual intervals takes a sixth of the time
-    gc.freeze()
+    usual = gc.get_threshold()
     gc.set_threshold(*_COLLECTED)
     try:
         app()
@@ -86,3 +86,5 @@ def main() -> None:
             sys.stderr.flush()
             os._exit(INTERRUPTED)
         raise
+    finally:
+        gc.set_threshold(*usual)

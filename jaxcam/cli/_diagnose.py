@@ -108,7 +108,7 @@ def diagnose(
         if out is not None:
             write_verdict(out, found, figures, notes, outlook)
     _print(output, found, [note for note in notes if note not in said], outlook)
-    output.write_json({**found.to_json(), **outlook.data()})
+    output.write_json({**found.to_json(), "notes": list(notes), **outlook.data()})
     if failure is not None:
         raise failure
 

@@ -1,5 +1,6 @@
 """The figures of a report of `jaxcam diagnose`."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -35,7 +36,13 @@ def draw(folder: Path, found: Diagnosis) -> list[tuple[Path, str]]:
     import matplotlib.pyplot as plt
 
     unseen, maps = (_UNSEEN, _MAPS) if changed(found) else (_UNSEEN_ALONE, _MAPS_ALONE)
-    unseen = unseen.format("" if _one_range(_typical(found)) else _TWO_RANGES)
+    of = (
+        _MEDIAN
+        if len({part.record for part in found.unseen[0]}) > 1
+        else "the recording"
+    )
+    ranges = "" if _one_range(_typical(found)) else _TWO_RANGES
+    unseen = unseen.format(of, ranges)
     colours = _COLOURS.format(_most_of_noise(found))
     maps = maps.format(Along(found.unseen[0]).word, colours)
     with style():
@@ -66,11 +73,11 @@ _MISSING = (
     "absorbed any part that they can represent."
 )
 _UNSEEN = (
-    "Residuals of held-out sections of one recording, that with the median improvement "
-    "by the missing effects, predicted one flight ahead after a fit to the other "
-    "sections: the textbook model (top), and the model with the missing effects "
-    "(bottom). The band is +-2 standard deviations of the noise.{}"
+    "Residuals of held-out sections of {}, predicted one flight ahead after a fit to "
+    "the other sections: the textbook model (top), and the model with the missing "
+    "effects (bottom). The band is +-2 standard deviations of the noise.{}"
 )
+_MEDIAN = "the recording with the median improvement by the missing effects"
 _TWO_RANGES = " The two axes have different ranges."
 _UNSEEN_ALONE = (
     "Residuals of held-out sections of one recording, predicted one flight ahead by "
@@ -88,7 +95,7 @@ _MAPS_ALONE = (
 )
 _COLOURS = (
     "For pure noise, one such map in a hundred would exceed +-{:.2g} standard errors; "
-    "colours are linear up to this limit and logarithmic above it."
+    "the colour scale is linear up to this limit and logarithmic above it."
 )
 
 
@@ -132,17 +139,29 @@ def _unseen(plt, found: Diagnosis):
 
 
 def _typical(found: Diagnosis) -> tuple[Residuals, Residuals]:
-    """Return the residuals before and after of the recording with the median
-    improvement.
+    """Return the residuals before and after of the recording (and channel) with the
+    median improvement; its sections, held out in turn, are joined.
     """
-    pairs = sorted(zip(*found.unseen), key=_improvement)
+    keys = list(dict.fromkeys((p.record, p.channel) for p in found.unseen[0]))
+    before, after = (
+        [_joined([p for p in parts if (p.record, p.channel) == key]) for key in keys]
+        for parts in found.unseen
+    )
+    pairs = sorted(zip(before, after), key=_improvement)
     return pairs[(len(pairs) - 1) // 2]
+
+
+def _joined(parts: Sequence[Residuals]) -> Residuals:
+    """Return the residuals of several sections of a recording as one object."""
+    columns = ("time", "turned", "value", "flight", "resting")
+    whole = {n: np.concatenate([getattr(p, n) for p in parts]) for n in columns}
+    return dataclasses.replace(parts[0], **whole)
 
 
 def _one_range(pair: tuple[Residuals, Residuals]) -> bool:
     """Return whether both residuals can be seen on axes of the same range."""
-    before, after = (float(np.max(np.abs(part.value))) for part in pair)
-    return before < _RANGES * max(after, pair[0].noise)
+    sizes = [float(np.max(np.abs(part.value))) for part in pair]
+    return max(sizes) < _RANGES * max(min(sizes), pair[0].noise)
 
 
 def _improvement(pair: tuple[Residuals, Residuals]) -> float:
@@ -172,7 +191,8 @@ def _maps(plt, found: Diagnosis):
         for parts in found.unseen[: len(sets)]
     ]
     most = _most_of_noise(found)
-    end = max(most, float(np.nanmax(np.abs(maps))))
+    sizes = np.abs(maps)
+    end = float(np.max(sizes, where=np.isfinite(sizes), initial=most))
     scale = SymLogNorm(linthresh=most, vmin=-end, vmax=end)
     image = None
     for column, of_model, which in zip(axes.T, maps, sets):
@@ -197,14 +217,13 @@ def _maps(plt, found: Diagnosis):
 def _colour_bar(figure, image, axes, most: float) -> None:
     """Draw a colour bar with ticks at the limits `most` of its linear part."""
     bar = figure.colorbar(image, ax=axes, label="mean residual\n(standard errors)")
-    powers = 10.0 ** np.arange(
-        math.ceil(math.log10(most)), math.log10(image.norm.vmax) + 0.01
-    )
-    outside = [power for power in powers if power > 1.5 * most]
-    ticks = [round(most, 1), *outside]
-    bar.set_ticks([*(-t for t in reversed(ticks)), 0.0, *ticks])
-    bar.set_ticklabels(
-        [f"{t:.3g}".replace("-", "\N{MINUS SIGN}") for t in bar.get_ticks()]
+    powers = 10.0 ** np.arange(1, 1 + math.log10(image.norm.vmax))
+    inside = (1.5 * most < powers) & (powers <= image.norm.vmax)
+    ticks = [most, *powers[inside]]
+    names = [f"{most:.2g}", *(f"{power:g}" for power in powers[inside])]
+    bar.set_ticks(
+        [*(-tick for tick in reversed(ticks)), 0.0, *ticks],
+        labels=[*(f"\N{MINUS SIGN}{name}" for name in reversed(names)), "0", *names],
     )
     bar.minorticks_off()
 

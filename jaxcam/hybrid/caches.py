@@ -35,7 +35,7 @@ class Cache:
         with self._lock:
             if key in self._results:
                 return self._results[key]
-            with _without_collection():
+            with _COLLECTOR.suspended():
                 made = make()
             if keeps(made):
                 self.keep(key, made)
@@ -59,18 +59,31 @@ class Cache:
             self._results.clear()
 
 
-@contextlib.contextmanager
-def _without_collection():
-    """Suspend the garbage collector while programs are traced: nearly all of the many
-    new objects are kept, and searching them takes a tenth of the time.
+class _Collector:
+    """The garbage collector, suspended while any thread traces a program: nearly all of
+    the many new objects are kept, and searching them takes a tenth of the time.
     """
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
+
+    def __init__(self):
+        self._lock, self._depth, self._enabled = threading.Lock(), 0, False
+
+    @contextlib.contextmanager
+    def suspended(self):
+        with self._lock:
+            if self._depth == 0:
+                self._enabled = gc.isenabled()
+                gc.disable()
+            self._depth += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._depth -= 1
+                if self._depth == 0 and self._enabled:
+                    gc.enable()
+
+
+_COLLECTOR = _Collector()
 
 
 class Latest:

@@ -26,6 +26,7 @@ _OPTIONS = {
     "xla_cpu_use_fusion_emitters": False,
     "xla_cpu_experimental_ynn_fusion_type": "LIBRARY_FUSION_TYPE_DOT",
 }
+_UNKNOWN = "No such compile option"
 # JAX keeps what it passed to the compiler, which needs more memory than the compiled
 # program: in a diagnosis, several hundred megabytes. These caches, and the setting
 # below, are not public; without them, a program needs more memory
@@ -74,7 +75,13 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
         # a compiled program contains the Python stack of each of its operations, up to
         # this depth, which would double its size
         with contextlib.nullcontext() if _STACK_DEPTH is None else _STACK_DEPTH(0):
-            found = outermost(*args, **kwargs)
+            try:
+                found = outermost(*args, **kwargs)
+            except jax.errors.JaxRuntimeError as error:
+                # another version of XLA may not know the options
+                if _UNKNOWN not in str(error):
+                    raise
+                return inner(*args, **kwargs)
         if _lowered() != before:
             _forget_lowered()
         return found

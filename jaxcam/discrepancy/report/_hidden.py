@@ -132,9 +132,9 @@ def hidden_words(found: Fit, hidden: Hidden, element: HiddenElement, unit: str) 
     said = f"{value:.4g} +- {error:.1g}"
     if isinstance(element, Resonator) and element.ratio > _NO_PEAK:
         return (
-            f"a force with an internal state: an oscillator at {said} Hz, driven by "
-            f"the motion, with {float(element.ratio):.2g} of critical damping, like a "
-            "mass on a rubber mount"
+            "a force with an internal state: a strongly damped oscillator, driven by "
+            f"the motion, with a natural frequency of {said} Hz and a damping ratio "
+            f"of {float(element.ratio):.2g}"
         )
     if isinstance(element, Resonator):
         return (

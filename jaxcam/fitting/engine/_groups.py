@@ -1,4 +1,4 @@
-"""Evaluate the pieces of a recording in groups that fit into the cache of a core."""
+"""Evaluate the pieces of a recording in groups, and skip groups of padding."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 
-# Maximum number of pieces in a group
+# Maximum number of pieces in a group, whose values fit into the cache of a core
 _GROUP = 64
 
 
@@ -18,7 +18,8 @@ def in_groups(
 ) -> Any:
     """Apply a function to each of `k` pieces, as `jax.vmap` does.
 
-    Groups without an existing piece are skipped.
+    Groups without an existing piece are skipped, except within `jax.vmap`, where a
+    condition computes both sides. The groups have the same size, a divisor of `k`.
 
     Args:
         function: A function of the arrays of one piece.
