@@ -23,6 +23,7 @@ import jaxcam as package
 from jaxcam import _xla_log, discrepancy
 from jaxcam.cli import app
 from jaxcam.cli._cache import keep_compiled_programs
+from jaxcam.cli._case import SIMULATED
 from jaxcam.cli._errors import one_sentence
 from jaxcam.cli._output import to_text
 from jaxcam.cli._parameters import assign_parameters, parameters
@@ -387,7 +388,9 @@ def test_a_verdict_is_kept_if_no_recording_can_be_recommended(tmp_path, monkeypa
     line = ["diagnose", "demo", "--next", f"--json={file}"]
     said = CliRunner().invoke(app, line)
     assert said.exit_code == 2 and "No flight occurs" in said.output
-    assert json.loads(file.read_text()) == {"verdict": "none"}
+    # notes on the recordings are kept too
+    written = json.loads(file.read_text())
+    assert written == {"verdict": "none", "notes": [SIMULATED]}
 
 
 @pytest.mark.parametrize(
