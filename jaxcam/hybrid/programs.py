@@ -26,6 +26,7 @@ _OPTIONS = {
     "xla_cpu_use_fusion_emitters": False,
     "xla_cpu_experimental_ynn_fusion_type": "LIBRARY_FUSION_TYPE_DOT",
 }
+# message of a version of XLA that lacks an option; programs then run without options
 _UNKNOWN = "No such compile option"
 # JAX keeps what it passed to the compiler, which needs more memory than the compiled
 # program: in a diagnosis, several hundred megabytes. These caches, and the setting
@@ -69,6 +70,7 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        nonlocal outermost
         if not is_outermost():
             return inner(*args, **kwargs)
         before = _lowered()
@@ -78,10 +80,10 @@ def program(function: Callable[P, T]) -> Callable[P, T]:
             try:
                 found = outermost(*args, **kwargs)
             except jax.errors.JaxRuntimeError as error:
-                # another version of XLA may not know the options
                 if _UNKNOWN not in str(error):
                     raise
-                return inner(*args, **kwargs)
+                outermost = inner
+                found = inner(*args, **kwargs)
         if _lowered() != before:
             _forget_lowered()
         return found

@@ -197,6 +197,7 @@ def _linear_flights(model_at, pieces: Pieces, extras: Extras, states, origin, sh
         return (end, last), end_rows, cost, *normal
 
     weight = jnp.where(part.known, extras.weight[:, None, None, None], 0.0)
+    # the results for a group of padding
     size, last = states.shape[-1], None if pieces.begins is None else pieces.begins[0]
     width = size + len(origin)
     square, row = jnp.zeros((width, width)), jnp.zeros(width)
