@@ -1,16 +1,22 @@
-"""Merge a stiffness and a force of the same argument by moving the stiffness's centre.
+"""Find the centre of a stiffness that depends on something other than the position.
 
 A stiffness `g(a) (q - c)` with an unknown centre c is the sum of a stiffness
-`g(a) (q - m)` about the assumed centre m and the force `(m - c) g(a)`.
+`g(a) (q - m)` about the assumed centre m and the force `(m - c) g(a)`. That force may
+have been found as a second function, or be hidden in the residual.
 """
 
 import dataclasses
+import math
 
 import numpy as np
 
 from ..terms import Factor, free_basis
 from ._free_fits import FreeFits, Missing, Subset
-from ._slots import emptied, Free
+from ._gains import added_gain, newton_step
+from ._heat import heat_of, heated
+from ._local_force import force_response, forces_at_nodes
+from ._slots import emptied, filled, Free, free_term
+from ._surfaces import Nodes
 
 
 # Number of points at which the two functions are compared
@@ -22,11 +28,18 @@ _ALIKE = 0.9
 
 
 def recentred(fits: FreeFits, found: Missing) -> Missing:
-    """Return the fit with one function instead of two, if that has more evidence."""
+    """Return the fit with one stiffness about another centre, instead of a stiffness
+    and a force or of a stiffness alone, if that has more evidence.
+    """
     curves = [f for f in found.functions if isinstance(f, Free) and f.smooth]
     for one in curves:
+        if one.family.factor is not Factor.DEFLECTION:
+            continue
         other = _partner(curves, one)
-        if other is None or not _proportional(found, one, other):
+        if other is None:
+            found = _about_own_centre(fits, found, one)
+            continue
+        if not _proportional(found, one, other):
             continue
         both = found
         for _ in range(_ROUNDS):
@@ -54,10 +67,57 @@ def _in_slot(found: Missing, one: Free) -> Free:
     return fresh
 
 
+def _about_own_centre(fits: FreeFits, found: Missing, one: Free) -> Missing:
+    """Return the fit with a stiffness about the centre that the residual suggests, if
+    that has more evidence.
+    """
+    price = math.log(found.problem.samples)
+    for _ in range(_ROUNDS):
+        one = _in_slot(found, one)
+        shift, gained = _suggested(fits, found, one)
+        if gained < price:
+            break
+        family = dataclasses.replace(one.family, middle=one.family.middle - shift)
+        moved = dataclasses.replace(one, family=family)
+        rest = tuple(f for f in found.functions if f.slot != one.slot)
+        subset = Subset(found.problem, (moved, *rest), found.names)
+        trial = fits.fitted(subset, found.fit.point)
+        if not trial.score + price < found.score:
+            break
+        found = trial
+    return found
+
+
+def _suggested(fits: FreeFits, found: Missing, one: Free) -> tuple[float, float]:
+    """Return the shift of the centre by the quadratic likelihood about a fit, and its
+    gain in twice the log-likelihood.
+
+    The rig parameters and the coefficients of the stiffness are free.
+    """
+    heat, point = heat_of(found.fit), found.fit.point
+    problem = heated(filled(found.problem, found.functions), heat)
+    response = force_response(problem, point, fits.rig)
+    nodes = Nodes.of(problem, response, heat)
+    force = dataclasses.replace(one.family, factor=Factor.ONE)
+    stiffness, other = (
+        forces_at_nodes(response, [free_term(family, "new")])
+        for family in (one.family, force)
+    )
+    value = np.array([found.fit[name].value for name in one.coefficients])
+    forces = np.concatenate([stiffness, (other @ value)[..., None]], axis=-1)
+    information, score, rig, new = nodes.quadratic(forces)
+    own = new[:-1]
+    spread = np.where(one.spread > 0, one.spread, one.roughness.size)
+    information[own, own] += 1 / spread**2
+    score[own] -= value / spread**2
+    free = np.concatenate([rig, own])
+    alike = fits.policy.distinct_information
+    step, _ = newton_step(information, score, np.append(free, new[-1]))
+    return float(step[-1]), added_gain(information, score, free, new[-1:], alike)
+
+
 def _partner(curves: list[Free], one: Free) -> Free | None:
     """Return the force that depends on the same argument as a stiffness, if any."""
-    if one.family.factor is not Factor.DEFLECTION:
-        return None
     alike = dataclasses.replace(one.family, factor=Factor.ONE)
     return next((f for f in curves if f.family.name == alike.name), None)
 
