@@ -116,6 +116,9 @@ EFFECTS = {
         0.04,
         0.12,
     ),
+    "shelf": _force(
+        _AT_PLACE, lambda u, w, phi, t, s: -np.tanh((u - 0.1) / 0.15), 0.03, 0.1
+    ),
     # of velocity
     "fast_drag": _force(
         _AT_SPEED,
@@ -131,6 +134,15 @@ EFFECTS = {
     ),
     "one_way": _force(_AT_SPEED, lambda u, w, phi, t, s: -1.0 * (w > 0), 0.02, 0.06),
     "cubic_drag": _force(_AT_SPEED, lambda u, w, phi, t, s: -(w**3), 0.08, 0.25),
+    "root_drag": _force(
+        _AT_SPEED,
+        lambda u, w, phi, t, s: -np.sign(w) * np.sqrt(np.abs(w)),
+        0.03,
+        0.1,
+    ),
+    "one_way_fast": _force(
+        _AT_SPEED, lambda u, w, phi, t, s: -np.maximum(w - 0.3, 0) ** 2, 0.1, 0.4
+    ),
     # of position and velocity
     "zone_friction": _force(
         _ON_THE_WAY,
@@ -154,6 +166,7 @@ EFFECTS = {
         _ON_THE_WAY, lambda u, w, phi, t, s: -direction(w) * u**2, 0.02, 0.06
     ),
     "centrifugal": _force(_ON_THE_WAY, lambda u, w, phi, t, s: u * w**2, 0.1, 0.3),
+    "lever": _force(_ON_THE_WAY, lambda u, w, phi, t, s: -u * w, 0.05, 0.15),
     # products of two functions of one argument
     "zone_damper": _force(
         _ON_THE_WAY, lambda u, w, phi, t, s: -w * _within(u, 0.1, 0.6), 0.05, 0.15
@@ -169,6 +182,12 @@ EFFECTS = {
         lambda u, w, phi, t, s: np.cos(phi - 1.0) * (u > 0.2),
         0.04,
         0.12,
+    ),
+    "moving_stop": _force(
+        ("phase", "position"),
+        lambda u, w, phi, t, s: -np.maximum(u - 0.4 + 0.2 * np.cos(phi), 0),
+        0.2,
+        0.5,
     ),
     # of the drive angle
     "pulse": _force(
@@ -192,6 +211,20 @@ EFFECTS = {
         0.05,
         0.15,
     ),
+    "lobes": _force(
+        ("phase",),
+        lambda u, w, phi, t, s: (
+            np.exp(3 * (np.cos(phi - 4) - 1)) - 0.6 * np.exp(6 * (np.cos(phi - 1.2) - 1))
+        ),
+        0.02,
+        0.06,
+    ),
+    "grip": _force(
+        ("phase", "velocity"),
+        lambda u, w, phi, t, s: -direction(w) * (np.cos(phi - 2) > 0.2),
+        0.02,
+        0.06,
+    ),
     # of time
     "ramp": _force(("time",), lambda u, w, phi, t, s: t, 0.02, 0.06),
     "jolt": _force(("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.55), 0.02, 0.06),
@@ -208,6 +241,12 @@ EFFECTS = {
     ),
     "stiff_later": _force(
         ("time", "position"), lambda u, w, phi, t, s: -u * (t > 0.5), 0.05, 0.15
+    ),
+    "settling": _force(
+        ("time", "position"), lambda u, w, phi, t, s: -u * np.exp(-4 * t), 0.05, 0.15
+    ),
+    "leak": _force(
+        ("time", "velocity"), lambda u, w, phi, t, s: w * (t > 0.6), 0.05, 0.15
     ),
     # with memory
     "relaxing": _force(
@@ -265,6 +304,15 @@ EFFECTS = {
         lambda u, w, phi, t, s: -np.exp(-s / 0.25),
         (0.05, 0.15),
     ),
+    "soft_arc": Effect(
+        "restitution",
+        ("phase",),
+        lambda u, w, phi, t, s: -1.0 * (np.cos(phi - 3.0) > 0.3),
+        (0.05, 0.15),
+    ),
+    "soft_slow": Effect(
+        "restitution", ("speed",), lambda u, w, phi, t, s: -((1 - s) ** 3), (0.05, 0.2)
+    ),
     # at the surface
     "thermal": Effect(
         "surface", ("time",), lambda u, w, phi, t, s: 1 - np.exp(-3 * t), (8.0, 25.0)
@@ -278,6 +326,9 @@ EFFECTS = {
     "shifted_wall": Effect(
         "surface", ("time",), lambda u, w, phi, t, s: 1.0 * (t > 0.5), (8.0, 25.0)
     ),
+    "breathing": Effect(
+        "surface", ("time",), lambda u, w, phi, t, s: np.sin(5 * t), (8.0, 25.0)
+    ),
     # in the sensor
     "off_centre": Effect(
         "sensor",
@@ -287,6 +338,15 @@ EFFECTS = {
     ),
     "bent_scale": Effect(
         "sensor", ("position",), lambda u, w, phi, t, s: u**2, (4.0, 12.0)
+    ),
+    "nick": Effect(
+        "sensor",
+        ("position",),
+        lambda u, w, phi, t, s: np.exp(-(((u - 0.1) / 0.15) ** 2)),
+        (4.0, 12.0),
+    ),
+    "fast_sensor": Effect(
+        "sensor", ("velocity",), lambda u, w, phi, t, s: w**2, (4.0, 12.0)
     ),
     "drift": Effect(
         "sensor", ("time",), lambda u, w, phi, t, s: np.sin(2.2 * t), (6.0, 20.0)

@@ -26,6 +26,8 @@ _ROUNDING = 1e-6
 # Information on the state of a piece, relative to that of a usual piece, above which
 # its derivatives diverge
 _DIVERGED = 1e6
+# Largest number of an equation: products of three are finite
+_LARGEST = float(np.cbrt(np.finfo(float).max))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,12 +144,16 @@ def _diverging(problem: Problem, ss: np.ndarray) -> np.ndarray:
     return large | ~np.all(np.isfinite(ss), axis=(-2, -1))
 
 
+def bounded(*arrays: np.ndarray) -> bool:
+    """Return whether all numbers are finite, even in products."""
+    return all(bool(np.all(np.abs(one) < _LARGEST)) for one in arrays)
+
+
 def _usable(information: np.ndarray, score: np.ndarray) -> bool:
-    """Return whether the numbers are finite, even in products, and the information is
-    positive semidefinite, except for rounding errors.
+    """Return whether the numbers are bounded and the information is positive
+    semidefinite, except for rounding errors.
     """
-    most = np.cbrt(np.finfo(float).max)
-    if not all(bool(np.all(np.abs(one) < most)) for one in (information, score)):
+    if not bounded(information, score):
         return False
     if not score.size:
         return True

@@ -33,7 +33,7 @@ from ...fitting.engine import (
 from ...hybrid.programs import program
 from ...parameters import FloatScalar
 from ..terms import Motion, Term
-from ._blocks import Blocks
+from ._blocks import Blocks, bounded
 from ._motion_of_pieces import motion_of_pieces
 
 
@@ -105,8 +105,9 @@ def stride_of(problem: Problem) -> int:
 def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Response:
     """Linearise about a point, with some parameters free and a force at every node.
 
-    The nodes are the times at which the integration steps evaluate the vector field, or
-    every `stride`-th of these times.
+    A recording whose motion diverges at the point says nothing about forces. The nodes
+    are the times at which the integration steps evaluate the vector field, or every
+    `stride`-th of these times.
     """
     columns = free_columns(problem, free)
     stride = stride_of(problem)
@@ -129,7 +130,7 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
     return Response(
         point,
         tuple(free),
-        jax.tree.map(np.asarray, found),
+        _without_diverging(jax.tree.map(np.asarray, found)),
         columns.place,
         at_nodes,
         np.asarray(problem.pieces.exists),
@@ -139,6 +140,23 @@ def force_response(problem: Problem, point: Point, free: Sequence[str]) -> Respo
         -prior * off_nominal(problem, columns, point),
         np.maximum(columns.record, 0),
     )
+
+
+def _without_diverging(found: LinearPieces) -> LinearPieces:
+    """Return the linear pieces `(r, k, ...)`; those of recordings whose derivatives
+    diverge are zero.
+    """
+    # costs are not part of the normal equations, and may be unknown
+    numbers = found._replace(flown_cost=None, joint_cost=None, rested_cost=None)
+    parts = jax.tree.leaves(numbers)
+    keep = np.array([bounded(*each) for each in zip(*parts)])
+    if np.all(keep):
+        return found
+
+    def kept(part):
+        return np.where(keep.reshape(-1, *[1] * (part.ndim - 1)), part, 0.0)
+
+    return jax.tree.map(kept, found)
 
 
 def force_blocks(
@@ -188,6 +206,8 @@ def blocks_at_nodes(
         whole, right = np.zeros((total, total)), np.zeros(total)
         whole[np.ix_(rows, rows)] = found.information[r][np.ix_(local, local)]
         right[rows] = found.score[r][local]
+        if not bounded(whole, right):
+            whole, right = np.zeros_like(whole), np.zeros_like(right)
         information.append(whole)
         score.append(right)
     none = np.zeros(width)

@@ -9,11 +9,13 @@ from jax.scipy.special import log_ndtr
 from jaxtyping import Array, Float
 
 from ._model import Sensor
+from ._scaled_erfc import scaled_erfc
 
 
 # Distance of a prediction from the interval of a rounded sample, in standard deviations
 # of the noise, beyond which the information follows from the slope of the cost
 _FAR = 5.0
+_ROOT_HALF = math.sqrt(0.5)
 
 
 class Scored(NamedTuple):
@@ -65,17 +67,22 @@ def _rounded(sensor: Sensor, off) -> Scored:
     """Return the likelihood of noise followed by rounding: the probability of an
     interval.
 
-    The probability is Phi(z_high) - Phi(z_low), with z = (off +- resolution / 2) /
-    noise.
+    The probability is Q(a) - Q(b), with (a, b) = (|off| -+ resolution / 2) / noise and
+    Q(x) = exp(-x**2 / 2) scaled_erfc(x / sqrt(2)) / 2. The factor exp(-a**2 / 2), which
+    underflows, is taken out of the logarithm.
     """
-    half = sensor.resolution / 2 / sensor.noise
-    # the probability is evaluated in the lower tail (by symmetry), where the difference
-    # of the two distribution functions remains accurate
-    z = -jnp.abs(off) / sensor.noise
-    high, low = log_ndtr(z + half), log_ndtr(z - half)
-    chance = high + jnp.log1p(-jnp.exp(low - high))
-    density = _log_density(z + half), _log_density(z - half)
-    pull = jnp.exp(density[1] - chance) - jnp.exp(density[0] - chance)
+    size, half = jnp.abs(off), sensor.resolution / 2
+    a, b = (size - half) / sensor.noise, (size + half) / sensor.noise
+    inside = a < 0
+    least = jnp.where(inside, a * a, 0.0)
+    beyond = jnp.where(inside, 0.0, a * a)
+    # ratio of the densities at b and a
+    ratio = jnp.exp(0.5 * (a - b) * (a + b))
+    near = scaled_erfc(jnp.abs(a) * _ROOT_HALF) / 2
+    rest = ratio * scaled_erfc(b * _ROOT_HALF) / 2
+    density = jnp.exp(-0.5 * least)
+    chance = jnp.where(inside, 1 - density * (near + rest), near - rest)
+    pull = density * (ratio - 1) / (chance * math.sqrt(2 * math.pi))
     # the constant normalises the cost for Gaussian noise of the same variance
     variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
@@ -83,10 +90,10 @@ def _rounded(sensor: Sensor, off) -> Scored:
     # only poor starting values lead this far from the interval; there, the cost is
     # steeper than the mean information predicts, so a step based on the mean
     # information would be too long
-    far = jnp.abs(off) > sensor.resolution / 2 + _FAR * sensor.noise
+    far = size > half + _FAR * sensor.noise
     safe = jnp.where(far, off, 1.0)
     information = jnp.where(far, slope / safe, 1 / variance)
-    return Scored(constant - 2 * chance, slope, information)
+    return Scored(constant - 2 * jnp.log(chance) + beyond, slope, information)
 
 
 def _beyond(sensor: Sensor, value, predicted) -> Scored:
