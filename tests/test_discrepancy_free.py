@@ -4,15 +4,17 @@ import dataclasses
 import math
 from types import SimpleNamespace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
+from jaxcam.discrepancy.evidence._unnamed import _simpler
 from jaxcam.discrepancy.report._curves import errors_of, graded, level_of
 from jaxcam.discrepancy.report._missing import _words
-from jaxcam.discrepancy.search import _free_fits, occam, roughness
+from jaxcam.discrepancy.search import _free_fits, Free, occam, Roughness, roughness
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
 from jaxcam.discrepancy.search._free_search import FreeSearch
 from jaxcam.discrepancy.terms import (
@@ -374,3 +376,49 @@ def test_a_function_that_single_pieces_do_not_exclude_ties(
     search = SimpleNamespace(policy=Policy(), alone=fits)
     assert FreeSearch._ties(search, "surface", "sensor") == ties  # pyright: ignore
     assert not FreeSearch._ties(search, "force", "sensor")  # pyright: ignore
+
+
+def test_an_edge_between_two_impacts_is_sharp_in_a_fit():
+    """Its value at an impact is that of one side, to rounding, while the derivative
+    with respect to its place shows the way to an impact nearby; in a simulation, the
+    surface does not jump."""
+    family = Family(Where.CONTACT, Variable.TIME, 0.0, 6.0)
+    step = next(one for one in family.primitives if one.name == "step")
+
+    def height(edge, t, exact=False):
+        numbers = [0.3, edge, *[0.0] * 23]
+        term = FREE[Where.CONTACT].of(family, "a", numbers, step)
+        term = term.exact() if exact else term.prepared()
+        return term.contact(Motion(*(jnp.asarray(x) for x in (t, 0.0, 0.0, 0.0))))
+
+    for off, value in ((-1e-3, 0.0), (1e-3, 0.3)):
+        at = 3.0 + off
+        assert float(height(0.5, at)) == pytest.approx(value, abs=1e-12)
+        assert float(jax.grad(height)(0.5, at)) < -10
+        assert float(jax.grad(height, 1)(0.5, at)) == 0.0
+        assert 0.1 < float(height(0.5, at, exact=True)) < 0.2
+    assert abs(float(jax.grad(height)(0.5, 3.5))) < 1e-6
+
+
+def test_a_single_formula_replaces_several_terms_only_if_it_is_simpler(
+    unchecked_types,
+):
+    """Two terms that leave more than noise, with a BIC of 1000 and two parameters."""
+    family = _family(Variable.VELOCITY, -1.0, 1.0)
+    form = next(one for one in family.primitives if one.name == "power of speed")
+    one = Free(family, Roughness(), "force_a", form)
+    best = SimpleNamespace(bic=1000.0, count=2)
+
+    def simpler(functions=(one,), names=(), score=900.0, noise=True):
+        search = SimpleNamespace(policy=POLICY, falls_short=lambda *a, **k: not noise)
+        found = SimpleNamespace(functions=functions, names=names, score=score)
+        return _simpler(search, found, best)  # pyright: ignore
+
+    assert simpler()
+    assert not simpler(score=995.0)
+    assert not simpler(noise=False)
+    assert not simpler(names=("viscous_damping",))
+    assert not simpler(functions=(dataclasses.replace(one, primitive=None),))
+    assert not simpler(functions=(one, dataclasses.replace(one, slot="force_b")))
+    best.count = 1
+    assert not simpler()

@@ -13,7 +13,9 @@ from jaxcam.fitting.engine._scaled_erfc import scaled_erfc
 
 def test_the_scaled_error_function():
     """To 3e-15, also where erfc is no longer a normal number."""
-    at = np.concatenate([[0.0], np.geomspace(1e-12, 1e12, 2001), np.linspace(26, 28, 9)])
+    at = np.concatenate(
+        [[0.0], np.geomspace(1e-12, 1e12, 2001), np.linspace(26, 28, 9)]
+    )
     np.testing.assert_allclose(scaled_erfc(jnp.asarray(at)), erfcx(at), rtol=3e-15)
 
 

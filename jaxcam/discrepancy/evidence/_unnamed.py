@@ -7,6 +7,7 @@ from typing import NamedTuple
 from ..policy import Policy
 from ..search import (
     decoys_of,
+    Free,
     FreeSearch,
     in_one_direction,
     Missing,
@@ -18,7 +19,7 @@ from ..search import (
     Trial,
     Trials,
 )
-from ..terms import EVERY, families, gaps_of
+from ..terms import EVERY, families, Family, gaps_of
 from ._held_out import held_out, HeldOut
 from ._redrawn import Needs, needs
 from ._rivals import Rival, rivals
@@ -60,10 +61,12 @@ def without_a_name(
 
     Two kinds of residual do not count: one near the noise that is small compared with
     the part explained by a named term, and one that the smoothing of dry friction may
-    leave. Functions that the bootstrap samples do not retain are dropped. If one of the
-    `earlier` fits, refitted to these recordings, leaves only noise, nothing else is
-    sought. If these fits allowed for model errors (`loosely`), no other residual is
-    tolerated, because the right function may not be among them.
+    leave. Several terms that leave such a residual, however, may only imitate a single
+    function, which is then chosen if it is a simpler explanation. Functions that the
+    bootstrap samples do not retain are dropped. If one of the `earlier` fits, refitted
+    to these recordings, leaves only noise, nothing else is sought. If these fits
+    allowed for model errors (`loosely`), no other residual is tolerated, because the
+    right function may not be among them.
 
     Friction in one direction of motion is tried `instead` of Coulomb friction. If it
     leaves only noise, or if what Coulomb friction leaves does not count, nothing else
@@ -77,22 +80,10 @@ def without_a_name(
     if not _admits(question, best):
         instead = None
     tolerable = bool(best.names) and most < small * (bare - best.fit.cost)
-    if tolerable and instead is None:
+    imitated = tolerable and instead is None
+    if imitated and len(best.names) < 2:
         return Unnamed()
-    visited = visited_states(problem)
-    positions, velocities, approach, times = visited.ranges(policy)
-    offered = families(
-        positions,
-        velocities,
-        approach,
-        times,
-        turned=question.turned,
-        gaps=_gaps_with_impacts(question, policy),
-        slip=question.references.slip_speed,
-        motion_unit=question.unit,
-        strides=visited.strides,
-    )
-
+    offered = _offered(question, policy)
     by_chance: list[Shuffled] = []
 
     def new_search(elements: bool) -> FreeSearch:
@@ -131,7 +122,10 @@ def without_a_name(
     always = policy.elements > 1
     results = [searched(new_search(always))]
     first, found, _ = results[0]
-    if not always and first.lacks_element(found) and not trials.clock.over:
+    if imitated:
+        simpler = found is not None and _simpler(first, found, best)
+        results = results if simpler else []
+    elif not always and first.lacks_element(found) and not trials.clock.over:
         results.append(searched(first.repeated(True)))
         second, found, _ = results[-1]
         if first.need.preferred and second.falls_short(found):
@@ -143,6 +137,35 @@ def without_a_name(
     chosen, its_needs = min(kept, key=lambda each: each[0].score)
     tried = [one for search, _, _ in results for one in search.tried]
     return Unnamed(chosen, its_needs, rivals(chosen, tried, policy, seed))
+
+
+def _offered(question: Question, policy: Policy) -> tuple[Family, ...]:
+    """Return the families of functions over the ranges that the recordings visit."""
+    visited = visited_states(question.problem)
+    positions, velocities, approach, times = visited.ranges(policy)
+    return families(
+        positions,
+        velocities,
+        approach,
+        times,
+        turned=question.turned,
+        gaps=_gaps_with_impacts(question, policy),
+        slip=question.references.slip_speed,
+        motion_unit=question.unit,
+        strides=visited.strides,
+    )
+
+
+def _simpler(search: FreeSearch, found: Missing, best: Trial) -> bool:
+    """Return whether a single formula leaves only noise, where several terms do not,
+    has at most as many parameters, and has clearly more evidence.
+    """
+    one, *others = found.functions
+    form = isinstance(one, Free) and not one.smooth
+    if others or found.names or not form or search.falls_short(found, tolerated=False):
+        return False
+    better = found.score < best.bic - search.policy.tie
+    return better and len(one.coefficients) <= best.count
 
 
 def _admits(question: Question, best: Trial) -> bool:

@@ -122,6 +122,16 @@ class Family:
         """Parametric forms of which a sum may replace a function of this family."""
         return (*self.primitives, *(ONLY_IN_SUMS if self.jumps else ()))
 
+    def is_sharp(self, form: Primitive) -> bool:
+        """Return whether a form jumps at its edges.
+
+        Impacts are so few that an edge lies between two of them; flights and moving
+        surfaces need smooth edges.
+        """
+        still = self.where is Where.CONTACT and self.argument is Variable.TIME
+        seen = self.where is Where.IMPACT or still
+        return seen and form.sharp and not form.parts
+
     def waves(self, count: int) -> tuple[Array, Array]:
         """Return rates and shifts of `count` sines of the argument, each `(count,)`.
 

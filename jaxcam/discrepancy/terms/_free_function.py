@@ -58,7 +58,8 @@ class FreeFunction(Term):
     `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
     `factors`, weights that select the argument and the factor; `middle`, `slip`;
     `stride`, the change of the argument in an integration step, over which derivatives
-    are averaged, or `None`; `gate`, the second form of a product, whose parameters are
+    are averaged, or `None`; `sharp`, whether the edges of the form are not smoothed,
+    except in derivatives; `gate`, the second form of a product, whose parameters are
     among the `coefficients` of the first (see `Gate`).
     """
 
@@ -79,6 +80,9 @@ class FreeFunction(Term):
     forms: Float[Array, " m"] = eqx.field(default=(0.0,) * MOST_PARTS, converter=_array)
     odd: Float[Array, ""] = eqx.field(default=0.0, converter=_array)
     stride: Float[Array, ""] | None = None
+    sharp: Float[Array, ""] = eqx.field(
+        default=0.0, converter=_array, metadata={"spare": True}
+    )
     # absent in saved systems without products
     gate: "FreeFunction | None" = eqx.field(default=None, metadata={"spare": True})
     table: Float[Array, " n"] | None = None
@@ -161,6 +165,7 @@ class FreeFunction(Term):
             constraint=family.constraint,
             forms=_indices(primitive),
             odd=float(primitive is not None and primitive.odd),
+            sharp=float(primitive is not None and family.is_sharp(primitive)),
             gate=gate
             and cls.of(gate.family, label, [0.0] * len(coefficients), gate.primitive),
         )
@@ -179,8 +184,15 @@ class FreeFunction(Term):
         return self._spline(argument) * turned + self.jump * direction
 
     def _spline(self, argument):
-        """Return the value of the spline with the derivatives of the softened one."""
+        """Return the value of the spline with the derivatives of the softened one.
+
+        In a fit, a sharp form has two values, of which one is zero; with exact
+        derivatives, it is smooth.
+        """
         assert self.table is not None
+        fixed = jax.lax.stop_gradient(argument)
+        if self.softened is not None:
+            argument = jnp.where(self.sharp > 0, fixed, argument)
         width = self.high - self.low
         start, spacing = knots_of(self.low, self.high)
         more = jnp.where(self.forms[0] > 0, BEYOND * width, 0.0)
@@ -189,7 +201,12 @@ class FreeFunction(Term):
         inside = jnp.where(self.periodic, inside % width, within)
         place = (inside + self.low - start) / spacing
         value, soft = interpolated((self.table, self.softened), place)
-        return value if soft is None else soft + jax.lax.stop_gradient(value - soft)
+        if soft is None:
+            return value
+        size = self.coefficients[0]
+        beyond = jnp.abs(value) > jnp.abs(size) / 2
+        value = jnp.where(self.sharp > 0, jnp.where(beyond, size, 0.0), value)
+        return soft + jax.lax.stop_gradient(value - soft)
 
     def _argument(self, motion: Motion, speed):
         options = (motion.position, speed, motion.phase, motion.t)
