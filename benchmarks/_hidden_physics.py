@@ -141,7 +141,7 @@ EFFECTS = {
         0.1,
     ),
     "one_way_fast": _force(
-        _AT_SPEED, lambda u, w, phi, t, s: -np.maximum(w - 0.3, 0) ** 2, 0.1, 0.4
+        _AT_SPEED, lambda u, w, phi, t, s: -(np.maximum(w - 0.3, 0) ** 2), 0.1, 0.4
     ),
     # of position and velocity
     "zone_friction": _force(
@@ -214,7 +214,8 @@ EFFECTS = {
     "lobes": _force(
         ("phase",),
         lambda u, w, phi, t, s: (
-            np.exp(3 * (np.cos(phi - 4) - 1)) - 0.6 * np.exp(6 * (np.cos(phi - 1.2) - 1))
+            np.exp(3 * (np.cos(phi - 4) - 1))
+            - 0.6 * np.exp(6 * (np.cos(phi - 1.2) - 1))
         ),
         0.02,
         0.06,

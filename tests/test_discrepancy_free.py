@@ -422,3 +422,12 @@ def test_a_single_formula_replaces_several_terms_only_if_it_is_simpler(
     assert not simpler(functions=(one, dataclasses.replace(one, slot="force_b")))
     best.count = 1
     assert not simpler()
+
+
+@pytest.mark.parametrize(
+    ("before", "heat", "left", "poor"),
+    [(24.95, 24.17, 10, True), (24.0, 12.0, 10, False), (3.0, 2.9, 5, False)],
+)
+def test_a_fit_that_improves_too_slowly_stays_poor(before, heat, left, poor):
+    """Costs per sample; a fit is poor above 4."""
+    assert FreeFits([], [], POLICY)._stays_poor(before, heat, left) is poor

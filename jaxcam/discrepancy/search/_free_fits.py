@@ -127,6 +127,10 @@ class FreeFits:
             if failed:
                 break
             earlier = subset._replace(functions=functions), found
+            if turn + 1 >= policy.prior_fits and self._stays_poor(
+                before, heat, turns - turn - 1
+            ):
+                break
             settled = max(heat, before) < policy.prior_settled * min(heat, before)
             if functions and not last:
                 fresh = self._rougher(subset, functions, point, heat)
@@ -143,6 +147,12 @@ class FreeFits:
             fits.append(earlier)
         scored = [self._scored(*one) for one in fits]
         return min(scored, key=lambda one: (not math.isfinite(one.score), one.score))
+
+    def _stays_poor(self, before: float, heat: float, left: int) -> bool:
+        """Return whether the cost per sample, which has fallen from `before` to `heat`,
+        will stay high in the `left` further fits if it continues to fall as slowly.
+        """
+        return heat * min(heat / before, 1.0) ** left > self.policy.near_cost
 
     def _scored(self, subset: Subset, found: Fit) -> Missing:
         score = self.score(subset, found)
