@@ -14,7 +14,15 @@ from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.evidence._unnamed import _simpler
 from jaxcam.discrepancy.report._curves import errors_of, graded, level_of
 from jaxcam.discrepancy.report._missing import _words
-from jaxcam.discrepancy.search import _free_fits, Free, occam, Roughness, roughness
+from jaxcam.discrepancy.search import (
+    _free_fits,
+    Free,
+    Hidden,
+    occam,
+    Roughness,
+    roughness,
+)
+from jaxcam.discrepancy.search._converged import stuck
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
 from jaxcam.discrepancy.search._free_search import FreeSearch
 from jaxcam.discrepancy.terms import (
@@ -300,7 +308,7 @@ def test_a_fit_that_fails_with_a_new_smoothness_does_not_replace_the_one_before(
     for name in ("filled", "heated"):
         monkeypatch.setattr(_free_fits, name, lambda given, _: given)
     monkeypatch.setattr(_free_fits, "_recentred", lambda *given: given[-1])
-    monkeypatch.setattr(_free_fits, "_alike", lambda *_: False)
+    monkeypatch.setattr(_free_fits, "alike", lambda *_: False)
 
     class Planned(FreeFits):
         def free(self, found):
@@ -391,6 +399,13 @@ def test_an_edge_between_two_impacts_is_sharp_in_a_fit():
         term = term.exact() if exact else term.prepared()
         return term.contact(Motion(*(jnp.asarray(x) for x in (t, 0.0, 0.0, 0.0))))
 
+    window = next(one for one in family.primitives if one.name == "window")
+    for numbers in ([0.3, 0.2, 0.6], [-0.3, 0.2, 0.6], [0.3, 0.6, 0.2]):
+        term = FREE[Where.CONTACT].of(family, "a", [*numbers, *[0.0] * 22], window)
+        at = [Motion(*(jnp.asarray(x) for x in (t, 0.0, 0.0, 0.0))) for t in (2.4, 4.2)]
+        inside, outside = (float(term.prepared().contact(motion)) for motion in at)
+        smooth = float(term.exact().contact(at[0]))
+        assert inside == pytest.approx(smooth, abs=1e-9) and outside == 0.0
     for off, value in ((-1e-3, 0.0), (1e-3, 0.3)):
         at = 3.0 + off
         assert float(height(0.5, at)) == pytest.approx(value, abs=1e-12)
@@ -424,10 +439,30 @@ def test_a_single_formula_replaces_several_terms_only_if_it_is_simpler(
     assert not simpler()
 
 
+class _Element(Hidden):
+    """An element that has changed by a fraction of the allowed step."""
+
+    def __init__(self, moved):
+        object.__setattr__(self, "moved", moved)
+
+    def moved_from(self, other):
+        return self.moved
+
+
 @pytest.mark.parametrize(
-    ("before", "heat", "left", "poor"),
-    [(24.95, 24.17, 10, True), (24.0, 12.0, 10, False), (3.0, 2.9, 5, False)],
+    ("costs", "moved", "given_up"),
+    [
+        ([90.0, 25.6, 24.9, 24.2, 23.5], 0.1, True),
+        # its parameters still change by the largest step, as on the way to a resonance
+        ([190.0, 181.0, 161.0, 139.0], 1.0, False),
+        ([96.0, 48.0, 24.0, 12.0], 0.1, False),
+        ([3.3, 3.2, 3.1, 3.0], 0.1, False),
+        ([25.6, 24.9], 0.1, False),
+    ],
 )
-def test_a_fit_that_improves_too_slowly_stays_poor(before, heat, left, poor):
-    """Costs per sample; a fit is poor above 4."""
-    assert FreeFits([], [], POLICY)._stays_poor(before, heat, left) is poor
+def test_an_element_that_hardly_changes_and_leaves_a_poor_fit_is_given_up(
+    costs, moved, given_up
+):
+    """Costs per sample of successive fits; a fit is poor above 4."""
+    pair = [_Element(moved)], [_Element(0.0)]
+    assert stuck(costs, *pair, 10, POLICY) is given_up

@@ -81,7 +81,7 @@ def without_a_name(
         instead = None
     tolerable = bool(best.names) and most < small * (bare - best.fit.cost)
     imitated = tolerable and instead is None
-    if imitated and len(best.names) < 2:
+    if imitated and (len(best.names) < 2 or not left):
         return Unnamed()
     offered = _offered(question, policy)
     by_chance: list[Shuffled] = []
@@ -96,7 +96,8 @@ def without_a_name(
             trials.progress,
             bare,
             elements,
-            trials.clock,
+            # the answer is known: time that this search takes is not lacking elsewhere
+            None if imitated else trials.clock,
             bool(question.model_errors),
         )
 
@@ -108,6 +109,8 @@ def without_a_name(
             known = min(found, key=lambda one: one.score, default=None)
         else:
             rank_decoys(search, known)
+        if imitated and not (known and _simpler(search, known, best)):
+            return search, None, None
         return search, *_needed(search, known, best.bic, seed, by_chance)
 
     if instead is not None:
@@ -122,10 +125,8 @@ def without_a_name(
     always = policy.elements > 1
     results = [searched(new_search(always))]
     first, found, _ = results[0]
-    if imitated:
-        simpler = found is not None and _simpler(first, found, best)
-        results = results if simpler else []
-    elif not always and first.lacks_element(found) and not trials.clock.over:
+    lacking = not (imitated or always) and first.lacks_element(found)
+    if lacking and not trials.clock.over:
         results.append(searched(first.repeated(True)))
         second, found, _ = results[-1]
         if first.need.preferred and second.falls_short(found):
@@ -133,7 +134,7 @@ def without_a_name(
             results.append(searched(first.repeated(False)))
     kept = [(one, its) for _, one, its in results if one is not None]
     if not kept:
-        return Unnamed(by_chance=tuple(by_chance))
+        return Unnamed(by_chance=() if imitated else tuple(by_chance))
     chosen, its_needs = min(kept, key=lambda each: each[0].score)
     tried = [one for search, _, _ in results for one in search.tried]
     return Unnamed(chosen, its_needs, rivals(chosen, tried, policy, seed))
@@ -157,15 +158,16 @@ def _offered(question: Question, policy: Policy) -> tuple[Family, ...]:
 
 
 def _simpler(search: FreeSearch, found: Missing, best: Trial) -> bool:
-    """Return whether a single formula leaves only noise, where several terms do not,
-    has at most as many parameters, and has clearly more evidence.
+    """Return whether a single form, or a product of two, leaves only noise, has at most
+    as many parameters as several terms, and has clearly more evidence.
     """
     one, *others = found.functions
-    form = isinstance(one, Free) and not one.smooth
-    if others or found.names or not form or search.falls_short(found, tolerated=False):
+    if others or found.names or not isinstance(one, Free):
+        return False
+    if one.primitive is None or one.primitive.parts or one.count > best.count:
         return False
     better = found.score < best.bic - search.policy.tie
-    return better and len(one.coefficients) <= best.count
+    return better and not search.falls_short(found, tolerated=False)
 
 
 def _admits(question: Question, best: Trial) -> bool:

@@ -12,6 +12,7 @@ from ...fitting.engine import Point
 from ..policy import Policy
 from ..terms import Term
 from ._blocks import blocks_of, values_of
+from ._converged import alike, stuck
 from ._gains import gain
 from ._given_up import given_up
 from ._heat import heat_of, heated, unscaled
@@ -20,9 +21,6 @@ from ._roughness import occam, roughness
 from ._slots import filled, Free, Part
 
 
-# Change, as a fraction of the allowed step, below which element parameters have
-# converged
-_SETTLED = 0.02
 # Predicted decrease of the cost, in units of its scale, below which a fit ends: far
 # less than any decision depends on
 _TOLERANCE = 0.1
@@ -106,6 +104,7 @@ class FreeFits:
         policy, functions = self.policy, subset.functions
         heat, point, found, failed = 1.0, start, None, False
         earlier: tuple[Subset, Fit] | None = None
+        costs: list[float] = []
         # in each fit, the parameters of a hidden element can change by a limited step
         hidden = any(isinstance(one, Hidden) for one in functions)
         turns = policy.prior_fits + (policy.element_fits if hidden else 0)
@@ -127,14 +126,13 @@ class FreeFits:
             if failed:
                 break
             earlier = subset._replace(functions=functions), found
-            if turn + 1 >= policy.prior_fits and self._stays_poor(
-                before, heat, turns - turn - 1
-            ):
-                break
+            costs.append(heat)
             settled = max(heat, before) < policy.prior_settled * min(heat, before)
             if functions and not last:
                 fresh = self._rougher(subset, functions, point, heat)
-                settled = settled and _alike(fresh, functions)
+                if hidden and stuck(costs, fresh, functions, turns - turn - 1, policy):
+                    break
+                settled = settled and alike(fresh, functions)
                 if not settled:
                     point = _recentred(subset.problem, fresh, functions, point)
                 functions = functions if settled else fresh
@@ -147,12 +145,6 @@ class FreeFits:
             fits.append(earlier)
         scored = [self._scored(*one) for one in fits]
         return min(scored, key=lambda one: (not math.isfinite(one.score), one.score))
-
-    def _stays_poor(self, before: float, heat: float, left: int) -> bool:
-        """Return whether the cost per sample, which has fallen from `before` to `heat`,
-        will stay high in the `left` further fits if it continues to fall as slowly.
-        """
-        return heat * min(heat / before, 1.0) ** left > self.policy.near_cost
 
     def _scored(self, subset: Subset, found: Fit) -> Missing:
         score = self.score(subset, found)
@@ -322,23 +314,6 @@ def _known(information, blocks, one: Part) -> None:
         rows = blocks.rows(one.coefficients)
         spread = np.where(one.spread > 0, one.spread, one.roughness.size)
         information[rows, rows] += (blocks.scale[rows] / spread) ** 2
-
-
-def _alike(fresh: Sequence[Part], functions: Sequence[Part]) -> bool:
-    """Return whether the smoothness of functions and the parameters of elements have
-    converged.
-    """
-    return all(_as_before(a, b) for a, b in zip(fresh, functions))
-
-
-def _as_before(fresh, one) -> bool:
-    if isinstance(fresh, Hidden):
-        return fresh.moved_from(one) < _SETTLED
-    return (
-        not fresh.smooth
-        or fresh.roughness.length == one.roughness.length
-        and abs(math.log(fresh.roughness.size / one.roughness.size)) < 1.0
-    )
 
 
 def _recentred(problem: Problem, fresh, functions, point: Point) -> Point:

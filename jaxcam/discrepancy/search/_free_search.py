@@ -210,6 +210,7 @@ class FreeSearch:
         self.progress(f"fitting {spelled(lead.label)} instead", None)
         found = self.additions.fitted(bare, lead, False)
         if found is not None:
+            found = recentred(self.fits, found)
             self.tried.append(found)
         return found
 

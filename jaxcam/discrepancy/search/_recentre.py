@@ -35,6 +35,7 @@ def recentred(fits: FreeFits, found: Missing) -> Missing:
     for one in curves:
         if one.family.factor is not Factor.DEFLECTION:
             continue
+        one = _in_slot(found, one)
         other = _partner(curves, one)
         if other is None:
             found = _about_own_centre(fits, found, one)
@@ -77,12 +78,10 @@ def _about_own_centre(fits: FreeFits, found: Missing, one: Free) -> Missing:
         shift, gained = _suggested(fits, found, one)
         if gained < price:
             break
-        family = dataclasses.replace(one.family, middle=one.family.middle - shift)
-        moved = dataclasses.replace(one, family=family)
         rest = tuple(f for f in found.functions if f.slot != one.slot)
-        subset = Subset(found.problem, (moved, *rest), found.names)
+        subset = Subset(found.problem, (_shifted(one, shift), *rest), found.names)
         trial = fits.fitted(subset, found.fit.point)
-        if not trial.score + price < found.score:
+        if not trial.score < found.score:
             break
         found = trial
     return found
@@ -92,7 +91,7 @@ def _suggested(fits: FreeFits, found: Missing, one: Free) -> tuple[float, float]
     """Return the shift of the centre by the quadratic likelihood about a fit, and its
     gain in twice the log-likelihood.
 
-    The rig parameters and the coefficients of the stiffness are free.
+    The other functions of the fit are fixed; their effect is known from the fit.
     """
     heat, point = heat_of(found.fit), found.fit.point
     problem = heated(filled(found.problem, found.functions), heat)
@@ -132,8 +131,13 @@ def _moved(found: Missing, one: Free, other: Free) -> Free:
     """Return the stiffness about the centre that the force suggests."""
     stiffness, force = (_values(found, f) for f in (one, other))
     shift = float(stiffness @ force) / max(float(stiffness @ stiffness), 1e-300)
+    return _shifted(one, shift)
+
+
+def _shifted(one: Free, shift: float) -> Free:
+    """Return a stiffness with its centre moved down by `shift`."""
     family = dataclasses.replace(one.family, middle=one.family.middle - shift)
-    return dataclasses.replace(one, family=family)
+    return dataclasses.replace(one, family=family, centred=True)
 
 
 def _values(found: Missing, one: Free) -> np.ndarray:

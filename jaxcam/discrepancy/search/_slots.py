@@ -51,7 +51,8 @@ class Free:
     """A fitted free function: its family, its prior, and its slot.
 
     With a `primitive`, the function has that form and no smoothness prior. With a
-    `gate`, it is the product of that form and a second one.
+    `gate`, it is the product of that form and a second one. If it is `centred`, the
+    centre of its family was fitted.
     """
 
     family: Family
@@ -59,6 +60,7 @@ class Free:
     slot: str
     primitive: Primitive | None = None
     gate: Gate | None = None
+    centred: bool = False
 
     @property
     def label(self) -> str:
@@ -100,8 +102,13 @@ class Free:
         """Return the gain that the function's parameters require, without the Occam
         factor of its prior.
         """
-        count = 0 if self.primitive is None else len(self.coefficients)
-        return count * math.log(samples)
+        return self.count * math.log(samples)
+
+    @property
+    def count(self) -> int:
+        """Return the number of fitted parameters that have no smoothness prior."""
+        own = 0 if self.primitive is None else len(self.coefficients)
+        return own + int(self.centred)
 
     @property
     def coefficients(self) -> list[str]:

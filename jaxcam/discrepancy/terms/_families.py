@@ -122,15 +122,16 @@ class Family:
         """Parametric forms of which a sum may replace a function of this family."""
         return (*self.primitives, *(ONLY_IN_SUMS if self.jumps else ()))
 
-    def is_sharp(self, form: Primitive) -> bool:
-        """Return whether a form jumps at its edges.
+    def has_sharp_edges(self, form: Primitive) -> bool:
+        """Return whether a fit smooths the edges of a form only in derivatives.
 
-        Impacts are so few that an edge lies between two of them; flights and moving
-        surfaces need smooth edges.
+        An edge lies between two impacts, and an impact near it belongs to one side. An
+        edge of a force is integrated over, and a body may rest on a surface that
+        depends on the phase.
         """
-        still = self.where is Where.CONTACT and self.argument is Variable.TIME
-        seen = self.where is Where.IMPACT or still
-        return seen and form.sharp and not form.parts
+        moves = self.where is Where.CONTACT and self.argument is Variable.TIME
+        at_impacts = self.where is Where.IMPACT or moves
+        return at_impacts and form.sharp and not form.parts
 
     def waves(self, count: int) -> tuple[Array, Array]:
         """Return rates and shifts of `count` sines of the argument, each `(count,)`.

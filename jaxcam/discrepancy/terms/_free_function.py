@@ -58,9 +58,9 @@ class FreeFunction(Term):
     `rates`, `shifts` of the sines; `low`, `high` of the argument; `picks` and
     `factors`, weights that select the argument and the factor; `middle`, `slip`;
     `stride`, the change of the argument in an integration step, over which derivatives
-    are averaged, or `None`; `sharp`, whether the edges of the form are not smoothed,
-    except in derivatives; `gate`, the second form of a product, whose parameters are
-    among the `coefficients` of the first (see `Gate`).
+    are averaged, or `None`; `sharp`, whether a fit smooths the edges of the form in
+    derivatives only; `gate`, the second form of a product, whose parameters are among
+    the `coefficients` of the first (see `Gate`).
     """
 
     sentence: ClassVar[str] = "an unnamed function"
@@ -165,7 +165,7 @@ class FreeFunction(Term):
             constraint=family.constraint,
             forms=_indices(primitive),
             odd=float(primitive is not None and primitive.odd),
-            sharp=float(primitive is not None and family.is_sharp(primitive)),
+            sharp=float(primitive is not None and family.has_sharp_edges(primitive)),
             gate=gate
             and cls.of(gate.family, label, [0.0] * len(coefficients), gate.primitive),
         )
@@ -203,9 +203,10 @@ class FreeFunction(Term):
         value, soft = interpolated((self.table, self.softened), place)
         if soft is None:
             return value
-        size = self.coefficients[0]
-        beyond = jnp.abs(value) > jnp.abs(size) / 2
-        value = jnp.where(self.sharp > 0, jnp.where(beyond, size, 0.0), value)
+        size = jnp.abs(self.coefficients[0])
+        on = jnp.abs(value) > size / 2
+        edged = jnp.where(on, jnp.sign(value) * size, 0.0)
+        value = jnp.where(self.sharp > 0, edged, value)
         return soft + jax.lax.stop_gradient(value - soft)
 
     def _argument(self, motion: Motion, speed):

@@ -15,6 +15,8 @@ from ._scaled_erfc import scaled_erfc
 # Distance of a prediction from the interval of a rounded sample, in standard deviations
 # of the noise, beyond which the information follows from the slope of the cost
 _FAR = 5.0
+# Resolution, in standard deviations of the noise, below which rounding has no effect
+_FINE = 1e-5
 _ROOT_HALF = math.sqrt(0.5)
 
 
@@ -72,28 +74,33 @@ def _rounded(sensor: Sensor, off) -> Scored:
     underflows, is taken out of the logarithm.
     """
     size, half = jnp.abs(off), sensor.resolution / 2
+    variance = sensor.floor**2
     a, b = (size - half) / sensor.noise, (size + half) / sensor.noise
     inside = a < 0
     least = jnp.where(inside, a * a, 0.0)
     beyond = jnp.where(inside, 0.0, a * a)
-    # ratio of the densities at b and a
-    ratio = jnp.exp(0.5 * (a - b) * (a + b))
+    # the density falls by this fraction between a and b
+    fall = -jnp.expm1(-sensor.resolution * size / sensor.noise**2)
     near = scaled_erfc(jnp.abs(a) * _ROOT_HALF) / 2
-    rest = ratio * scaled_erfc(b * _ROOT_HALF) / 2
+    rest = (1 - fall) * scaled_erfc(b * _ROOT_HALF) / 2
     density = jnp.exp(-0.5 * least)
     chance = jnp.where(inside, 1 - density * (near + rest), near - rest)
-    pull = density * (ratio - 1) / (chance * math.sqrt(2 * math.pi))
+    # in a very short interval, the density is constant, and the difference is lost
+    fine = sensor.resolution < _FINE * sensor.noise
+    chance = jnp.where(fine, 1.0, chance)
+    pull = -density * fall / (chance * math.sqrt(2 * math.pi))
     # the constant normalises the cost for Gaussian noise of the same variance
-    variance = sensor.floor**2
     constant = jnp.log(sensor.resolution**2 / (2 * jnp.pi * variance))
-    slope = -jnp.sign(off) * pull / sensor.noise
+    cost = constant - 2 * jnp.log(chance) + beyond
+    cost = jnp.where(fine, off * off / variance, cost)
+    slope = jnp.where(fine, off / variance, -jnp.sign(off) * pull / sensor.noise)
     # only poor starting values lead this far from the interval; there, the cost is
     # steeper than the mean information predicts, so a step based on the mean
     # information would be too long
     far = size > half + _FAR * sensor.noise
     safe = jnp.where(far, off, 1.0)
     information = jnp.where(far, slope / safe, 1 / variance)
-    return Scored(constant - 2 * jnp.log(chance) + beyond, slope, information)
+    return Scored(cost, slope, information)
 
 
 def _beyond(sensor: Sensor, value, predicted) -> Scored:
