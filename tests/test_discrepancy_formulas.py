@@ -334,3 +334,14 @@ def test_a_wavelength_is_positive():
     written = formula_of(family, wave, np.array([0.5, 2.0, 0.4]), "force")
     assert formula_of(family, wave, np.array([0.5, -2.0, -0.4]), "force") == written
     assert "with a wavelength of 0.75" in written[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"), [("wave", (0.7, 2.3, 0.4)), ("straight", (2.0,))]
+)
+def test_a_formula_does_not_subtract_zero(name, numbers):
+    """Time begins at zero."""
+    family = Family(Where.CONTACT, Variable.TIME, 0.0, 6.0)
+    form = next(one for one in family.primitives if one.name == name)
+    text, words = formula_of(family, form, np.array(numbers), "surface")
+    assert "*time" in text and " - 0)" not in text and text in words

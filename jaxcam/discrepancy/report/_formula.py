@@ -135,6 +135,7 @@ def formula_of(
     elif kind == "restitution":
         text = f"exp({text})"
     text = text.replace("- -", "+ ")
+    text = text.replace(f"({_name(family)} - 0)", _name(family))
     return text, f"{thing} that {says}: {text}{mechanism}"
 
 
@@ -157,7 +158,6 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
     """Return all values that a formula may contain, in the units of the argument."""
     low, width = family.low, family.high - family.low
     size, first, second = (*map(float, numbers), 0.0, 0.0)[:3]
-    x = "speed" if family.argument is Variable.APPROACH else str(family.argument)
     shown = {
         "size": size,
         "slope": size / width,
@@ -187,12 +187,17 @@ def _values(family: Family, numbers: np.ndarray) -> Mapping[str, str]:
     }
     unit = unit_along(family.argument, family.motion_unit)
     words = {
-        "x": x,
+        "x": _name(family),
         "trend": "decays" if first < 0 else "grows",
         "pulls": "pulls towards" if size < 0 else "pushes away from",
         "unit": quantity("", unit),
     }
     return {name: f"{value:.4g}" for name, value in shown.items()} | words
+
+
+def _name(family: Family) -> str:
+    """Return the name of the argument in a formula."""
+    return "speed" if family.argument is Variable.APPROACH else str(family.argument)
 
 
 def _turned(angle: float) -> float:
