@@ -1,6 +1,7 @@
 """Define a hybrid automaton: named modes and transitions between them."""
 
 import abc
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -50,6 +51,10 @@ class HybridAutomaton(SwitchedSystem):
     """Names of the modes."""
     transitions: ClassVar[tuple[tuple[str, str], ...]]
     """For each transition, the names of the modes before and after it."""
+    held: ClassVar[Mapping[str, tuple[int, ...]]] = {}
+    """For each mode in which something holds velocities, such as a latch or a brake,
+    their indices in the state: forces that a diagnosis adds do not change them.
+    """
 
     @abc.abstractmethod
     def fields(
@@ -170,6 +175,22 @@ class HybridAutomaton(SwitchedSystem):
         for i in range(1, len(self.modes)):
             found = jnp.where(present == i, rows[i], found)
         return found
+
+    def forced(
+        self,
+        rate: Float[Array, " n"],
+        pushed: Float[Array, " n"],
+        sides: Float[Array, " k"],
+    ) -> Float[Array, " n"]:
+        """Return the rate of change with added forces, except for velocities that the
+        present mode holds.
+        """
+        present = self.mode(sides)
+        for mode, places in self.held.items():
+            inside = present == self.modes.index(mode)
+            for k in places:
+                pushed = pushed.at[k].set(jnp.where(inside, rate[k], pushed[k]))
+        return pushed
 
     def reset(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]

@@ -95,6 +95,29 @@ class SwitchedSystem(HybridSystem):
         """
         return jax.vmap(lambda one: self.branch(t, state, one))(sides)
 
+    def forced(
+        self,
+        rate: Float[Array, " n"],
+        pushed: Float[Array, " n"],
+        sides: Float[Array, " k"],
+    ) -> Float[Array, " n"]:
+        """Return the rate of change with forces that are added to the system.
+
+        Override it if a force has no effect on some sides, because something else holds
+        the body there.
+
+        Args:
+            rate: Rate of change without the added forces, shape `(n,)`.
+            pushed: The same with the forces on all components that they act on, shape
+                `(n,)`.
+            sides: +1 or -1 for each surface, shape `(k,)`.
+
+        Returns:
+            Rate of change of the state, shape `(n,)`: by default, `pushed`.
+        """
+        del rate, sides
+        return pushed
+
     def distances(
         self, t: RealScalar, state: State, sides: Float[Array, " k"]
     ) -> Float[Array, " k"]:

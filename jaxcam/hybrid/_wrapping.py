@@ -131,6 +131,10 @@ class SwitchedWrapping(Wrapping, SwitchedSystem):
         """Return the rates of the inner system."""
         return self.inner.branch(t, state, sides)
 
+    def forced(self, rate, pushed, sides):
+        """Return the rates of the inner system with added forces."""
+        return self.inner.forced(rate, pushed, sides)
+
     def sides(self, t, state):
         """Return the sides of the inner system."""
         return self.inner.sides(t, state)

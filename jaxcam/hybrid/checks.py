@@ -224,9 +224,20 @@ def _check_modes(system: HybridAutomaton, t0, state) -> None:
             f"a transition of {name} leads from {loops[0]} to {loops[0]}; add a second "
             "mode with the same vector field"
         )
+    n = state.shape[0]
+    if lost := sorted(set(system.held) - set(system.modes)):
+        raise ValueError(
+            f"held of {name} names the modes {', '.join(lost)}, which `modes` does not "
+            f"contain; it contains {', '.join(system.modes)}"
+        )
+    if far := sorted(
+        {k for places in system.held.values() for k in places} - {*range(n)}
+    ):
+        raise ValueError(
+            f"held of {name} contains the index {far[0]}; the state has {n} components"
+        )
     own = _shape(system, "surfaces", t0, state)
     sides = jax.ShapeDtypeStruct((own.size,), jnp.float64)
-    n = state.shape[0]
     for method, more, shape, each in (
         ("fields", (sides,), (len(system.modes), n), "mode"),
         ("guards", (), (transitions,), "transition"),

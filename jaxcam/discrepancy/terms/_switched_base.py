@@ -14,7 +14,8 @@ from ._with_terms import WithTerms
 
 
 class SwitchedWithTerms(WithTerms, SwitchedWrapping):
-    """A switched system and terms added to each of its branches.
+    """A switched system and terms added to each of its branches, except to velocities
+    that a mode holds.
 
     The sides of the surfaces must not change the rates of the coordinates, only those
     of their velocities.
@@ -27,14 +28,20 @@ class SwitchedWithTerms(WithTerms, SwitchedWrapping):
         return self.branch(t, state, self.sides(t, state))
 
     def branch(self, t, state, sides) -> jax.Array:
-        return self._pushed(t, state, self.base.branch(t, state, sides))
+        field = self.base.branch(t, state, sides)
+        return self.base.forced(field, self._pushed(t, state, field), sides)
 
     def branches(self, t, state, sides) -> jax.Array:
         fields = self.base.branches(t, state, sides)
         # forces change with the sides, velocities do not; a term that depends on the
         # motion alone is therefore evaluated only once
         own = fields[0]
-        return jax.vmap(lambda field: self._pushed(t, state, field, own))(fields)
+
+        def pushed(field, sides):
+            forces = self._pushed(t, state, field, own)
+            return self.base.forced(field, forces, sides)
+
+        return jax.vmap(pushed)(fields, sides)
 
 
 class SwitchedWithHidden(WithHidden, SwitchedWrapping):
@@ -55,11 +62,26 @@ class SwitchedWithHidden(WithHidden, SwitchedWrapping):
         return self.base.distances(t, self._own(state), sides)
 
     def branch(self, t, state, sides) -> jax.Array:
-        return self._driven(state, self.base.branch(t, self._own(state), sides))
+        field = self.base.branch(t, self._own(state), sides)
+        return self._held(field, self._driven(state, field), sides)
 
     def branches(self, t, state, sides) -> jax.Array:
         fields = self.base.branches(t, self._own(state), sides)
-        return jax.vmap(lambda field: self._driven(state, field))(fields)
+
+        def driven(field, sides):
+            return self._held(field, self._driven(state, field), sides)
+
+        return jax.vmap(driven)(fields, sides)
+
+    def _held(self, field, driven, sides) -> jax.Array:
+        """Return the rates with the force of the element, unless a mode holds the
+        body.
+        """
+        own = self.base.forced(field, self._own(driven), sides)
+        return driven.at[: -self._size].set(own)
+
+    def forced(self, rate, pushed, sides) -> jax.Array:
+        return self._held(self._own(rate), pushed, sides)
 
     def sides(self, t, state):
         return self.base.sides(t, self._own(state))
