@@ -131,6 +131,8 @@ def test_no_module_of_the_package_keeps_numbers_of_its_own():
         "_STEP",
         "_LARGEST_START",
         "_SETTLED",
+        "_REACHING",
+        "_SLOW",
         # rounds in which the centre of a stiffness is estimated
         "_ROUNDS",
         "_ALIKE",
