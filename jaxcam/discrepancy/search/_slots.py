@@ -172,13 +172,19 @@ def roomy(
         empty.append(HiddenForce.empty(*driven.position.shape))
     faults = more_faults(problem.model, problem.parameters)
     wide = extended(problem, empty, problem.start, faults)
-    layout = dataclasses.replace(wide.layout, ready=_with_splines)
+    layout = dataclasses.replace(wide.layout, ready=_with_splines, apart=_one_by_one)
     return dataclasses.replace(wide, layout=layout)
 
 
 def _with_splines(model: Model) -> Model:
     """Return the model with the splines of its functions precomputed."""
     return eqx.tree_at(terms_of, model, prepared_terms(terms_of(model)))
+
+
+def _one_by_one(model: Model) -> Model:
+    """Return the same as `_with_splines`, with a loop for each function."""
+    terms = [prepared_terms((one,))[0] for one in terms_of(model)]
+    return eqx.tree_at(terms_of, model, tuple(terms))
 
 
 def slots_of(problem: Problem, where: Where, gap: int = 0) -> list[str]:

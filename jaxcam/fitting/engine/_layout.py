@@ -37,7 +37,9 @@ def strongly_typed(tree: T) -> T:
 class Layout(eqx.Module):
     """The location of the parameters among the leaves of a model.
 
-    `ready` precomputes the quantities that a model needs at every step.
+    `ready` precomputes the quantities that a model needs at every step. `apart` does
+    the same without steps that several parameters share, which would hide on which of
+    them a quantity depends.
     """
 
     model: Model
@@ -46,6 +48,8 @@ class Layout(eqx.Module):
     """Index of each parameter among the leaves."""
     ready: Callable[[Model], Model] = eqx.field(static=True, default=_as_it_is)
     """Prepares a model for many evaluations."""
+    apart: Callable[[Model], Model] | None = eqx.field(static=True, default=None)
+    """The same, with a separate computation for each part; default: `ready`."""
 
     def at(self, values: Float[Array, " q"]) -> Model:
         """Return the model with the given parameter values."""

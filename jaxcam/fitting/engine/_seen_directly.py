@@ -1,5 +1,7 @@
 """Find parameters that affect samples other than through motion and calibration."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -46,12 +48,13 @@ def seen_directly(layout: Layout, pieces: Pieces) -> tuple[bool, ...]:
 
 
 def _traced(layout: Layout, n: int, m: int, c: int) -> tuple[bool, ...]:
+    apart = dataclasses.replace(layout, ready=layout.apart or layout.ready)
     number, steps, each = jnp.zeros(()), jnp.zeros(n), jnp.zeros(c)
     nodes = Nodes(*(jnp.zeros((n, c)) for _ in Nodes._fields))
     sensing, along = Calibration(each, each, each), DriveState(steps, steps, steps)
 
     def seen(*values):
-        model, place = layout.placed(values), jnp.zeros((n, m))
+        model, place = apart.placed(values), jnp.zeros((n, m))
         return samples(model, nodes, sensing, number, number, place, (steps, along))
 
     values = np.zeros(len(layout.places))
