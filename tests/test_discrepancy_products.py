@@ -13,10 +13,11 @@ from benchmarks.unnamed import hidden_case, judged
 from jaxcam.discrepancy import diagnose
 from jaxcam.discrepancy.report._product import product_of, product_table
 from jaxcam.discrepancy.search import Free, free_term, Roughness
+from jaxcam.discrepancy.search._bivariate_likelihood import BivariateLikelihood
 from jaxcam.discrepancy.search._product_forms import ProductSearch
 from jaxcam.discrepancy.search._slots import filled, roomy
-from jaxcam.discrepancy.search._surfaces import Surface, SurfaceLikelihood
 from jaxcam.discrepancy.terms import (
+    Bivariate,
     Family,
     Gate,
     Motion,
@@ -141,19 +142,19 @@ def test_a_product_with_an_edge_outside_the_data_is_refused():
 
 
 @pytest.mark.parametrize("first, gate, forms, numbers", PRODUCTS[:2])
-def test_a_product_is_recognised_from_its_surface(first, gate, forms, numbers):
-    """Its forms, its edges to 3 % of the range and its size to 20 %: a surface resolves
-    a tenth of the range, and the fit to trajectories begins here."""
-    surface = Surface(_family(first), _family(gate))
+def test_a_product_is_recognised_from_a_free_function(first, gate, forms, numbers):
+    """Its forms, its edges to 3 % of the range and its size to 20 %: a free function
+    resolves a tenth of the range, and the fit to trajectories begins here."""
+    family = Bivariate(_family(first), _family(gate))
     rng = np.random.default_rng(4)
-    size = int(np.prod(surface.shape))
+    size = int(np.prod(family.shape))
     mixed = rng.normal(size=(3 * size, size))
     information = 1e4 * mixed.T @ mixed / (3 * size)
     one = _product(first, gate, forms)
-    bare = SurfaceLikelihood(
-        surface,
-        information.reshape(*surface.shape, *surface.shape),
-        np.zeros(surface.shape),
+    bare = BivariateLikelihood(
+        family,
+        information.reshape(*family.shape, *family.shape),
+        np.zeros(family.shape),
         Roughness(0.0, 0.2, 1.0),
     )
     search = ProductSearch(bare, 10.0)
@@ -166,7 +167,7 @@ def test_a_product_is_recognised_from_its_surface(first, gate, forms, numbers):
     ):
         curves.append(search.closest(side, form, np.array(own)))
     slope = information @ np.outer(*curves).ravel()
-    likelihood = bare._replace(slope=slope.reshape(surface.shape))
+    likelihood = bare._replace(slope=slope.reshape(family.shape))
     best = ProductSearch(likelihood, 10.0).likely()[0]
     assert (best.primitive.name, best.gate.primitive.name) == forms
     off = np.abs(best.numbers - numbers)

@@ -23,7 +23,7 @@ from ..recordings import (
 from ..recordings.cut import measured_noise
 from .report import Diagnosis, slopes_of_function
 from .search import Blocks, blocks_of, newton_step
-from .terms import FreeFunction, Term, WithTerms
+from .terms import FittedFunction, Term, WithTerms
 
 
 @dataclasses.dataclass(frozen=True)
@@ -196,7 +196,9 @@ def next_experiments(
     terms = tuple(
         t
         for t in _terms(found)
-        if (t.label in slots if isinstance(t, FreeFunction) else t.name in found.names)
+        if (
+            t.label in slots if isinstance(t, FittedFunction) else t.name in found.names
+        )
         and t.acts
     )
     system = dataclasses.replace(whole, terms=terms)

@@ -12,7 +12,7 @@ from ...tables import ShortTable
 from ..evidence import Differing, Ripple, Structure
 from ..policy import Policy
 from ..terms import (
-    FreeFunction,
+    FittedFunction,
     system_with_element,
     Value,
     Where,
@@ -247,7 +247,7 @@ class Diagnosis:
             for term in system.terms
             if Where.SENSOR not in term.acts
             and (
-                isinstance(term, FreeFunction)
+                isinstance(term, FittedFunction)
                 and term.label in used
                 or term.acts
                 and term.name in self.names

@@ -12,8 +12,11 @@ from ...fitting import Fit
 from ..policy import Policy
 from ..search import Free, Hidden, Missing
 from ..terms import (
+    Bivariate,
+    BivariateForce,
     Factor,
     Family,
+    FittedFunction,
     FreeFunction,
     gaps_of,
     HiddenElement,
@@ -23,6 +26,7 @@ from ..terms import (
     Variable,
     Where,
 )
+from ._bivariate import bivariate_slopes, bivariate_table
 from ._close_forms import CloseForm
 from ._curves import (
     covariance_of,
@@ -179,6 +183,18 @@ def _one(
     family, kind = one.family, _KINDS[one.family.where]
     numbers = np.array([found[name].value for name in one.coefficients])
     covariance = covariance_of(found, one.coefficients, policy)
+    if isinstance(one.prior, Bivariate):
+        points, unit = policy.shape_points // 2, _unit(family)
+        table = bivariate_table(one.prior, numbers, covariance, points, unit)
+        return MissingFunction(
+            kind,
+            one.arguments,
+            *table[:3],
+            unit,
+            table.words,
+            found.problem.records,
+            numbers=tuple(one.coefficients),
+        )
     if one.gate is not None:
         points = policy.shape_points // 2
         grid, value, error = product_table(one, numbers, covariance, points)
@@ -276,13 +292,17 @@ def slopes_of_function(
     found: Fit, one: MissingFunction, points: int = 100
 ) -> Float[np.ndarray, "points p"]:
     """Return the derivatives of a function, without its factor, with respect to its
-    parameters; those of a product on a grid of about as many points.
+    parameters; those of a function of two arguments, such as a product, on a grid of
+    about as many points.
     """
     (term,) = (
         term.exact()
         for term in terms_of(found.model())
-        if isinstance(term, FreeFunction) and term.label == one.slot
+        if isinstance(term, FittedFunction) and term.label == one.slot
     )
+    if isinstance(term, BivariateForce):
+        return bivariate_slopes(term, one.numbers, points)
+    assert isinstance(term, FreeFunction)
     if term.gate is not None:
         return product_slopes(term, points)
     along = jnp.linspace(term.low, term.high, points)

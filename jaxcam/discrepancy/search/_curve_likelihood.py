@@ -75,19 +75,28 @@ class CurveLikelihood(NamedTuple):
         """Return the coefficients of the sums of sines that are closest to a form, for
         several sets of its parameters.
         """
-        family = self.family
-        along = np.linspace(family.low, family.high, _GRID)
-        direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
-        place = Place.between(along[None], family.low, family.high)
-        columns = list(numbers.T[:, :, None])
-        values = primitive.value(place, columns, direction[None])
-        values = np.broadcast_to(values, (len(numbers), _GRID))
-        return values @ _projection(family, len(self.slope)).T
+        return sines_of(self.family, len(self.slope), primitive, numbers)
 
-    def starts_of(self, primitive: Primitive) -> Float[np.ndarray, "n p"]:
-        """Return all starting values of the parameters of a form of size one."""
-        starts = np.array(list(itertools.product((1.0,), *primitive.starts)))
-        return starts.reshape(-1, primitive.count)
+
+def sines_of(
+    family: Family, count: int, primitive: Primitive, numbers: Float[np.ndarray, "n p"]
+) -> Float[np.ndarray, "n count"]:
+    """Return `count` coefficients of the sums of sines of a family that are closest to
+    a form, for several sets of its parameters.
+    """
+    along = np.linspace(family.low, family.high, _GRID)
+    direction = np.tanh(along / family.slip) if family.jumps else np.zeros(_GRID)
+    place = Place.between(along[None], family.low, family.high)
+    columns = list(numbers.T[:, :, None])
+    values = primitive.value(place, columns, direction[None])
+    values = np.broadcast_to(values, (len(numbers), _GRID))
+    return values @ _projection(family, count).T
+
+
+def starts_of(primitive: Primitive) -> Float[np.ndarray, "n p"]:
+    """Return all starting values of the parameters of a form of size one."""
+    starts = np.array(list(itertools.product((1.0,), *primitive.starts)))
+    return starts.reshape(-1, primitive.count)
 
 
 @functools.lru_cache(maxsize=8)
@@ -152,7 +161,7 @@ def promising(likelihood: CurveLikelihood, most: int) -> list[Start]:
     """
     ranked, vectors = [], Vectors(likelihood)
     for primitive in likelihood.family.primitives:
-        starts = likelihood.starts_of(primitive)
+        starts = starts_of(primitive)
         sines = likelihood.sines_of(primitive, starts)
         told = sines @ likelihood.slope
         seen = np.einsum("ka,ab,kb->k", sines, likelihood.information, sines)

@@ -11,7 +11,16 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ...fitting.engine import Point
-from ..terms import Family, free_basis, Gate, Place, Primitive, terms_of, Where
+from ..terms import (
+    Bivariate,
+    Family,
+    free_basis,
+    Gate,
+    Place,
+    Primitive,
+    terms_of,
+    Where,
+)
 from ._free_fits import Missing, Subset
 from ._free_search import FreeSearch
 from ._slots import Free
@@ -21,6 +30,8 @@ from ._starting_at import starting_at
 # Number of points at which a function of another range is compared with the same
 # function
 _GRID = 400
+# Number of points of each argument of a function of two arguments
+_SIDE = 40
 
 
 def refitted(search: FreeSearch, earlier: Sequence[Missing]) -> Missing | None:
@@ -75,7 +86,8 @@ def _for_search(search: FreeSearch, one: Missing) -> tuple[Subset, Point] | None
     """Return functions and terms for the problem of a search, and a starting point;
     `None` if it has no place for them.
     """
-    problem, families = search.problem, {f.name: f for f in search.families}
+    families = {f.name: f for f in search.families}
+    problem = search.rooms.of(one).whole
     labels = {getattr(term, "label", "") for term in terms_of(problem.model)}
     point = starting_at(one.fit, problem)
     values, functions = np.array(point.values), []
@@ -103,6 +115,9 @@ def _over_range(
     family = _alike(one.family, families)
     if family is None:
         return None
+    if one.across is not None:
+        across = _alike(one.across, families)
+        return across and _bivariate_over_range(one, numbers, family, across)
     if one.primitive is None:
         along = np.linspace(family.low, family.high, _GRID)
         old, new = (free_basis(f, along, len(numbers)) for f in (one.family, family))
@@ -119,6 +134,19 @@ def _over_range(
         moved = np.append(own[0] * moved[0], [*moved[1:], *own[1:]])
         gate = Gate(other, gate.primitive)
     return dataclasses.replace(one, family=family, gate=gate), moved
+
+
+def _bivariate_over_range(
+    one: Free, numbers: np.ndarray, family: Family, across: Family
+) -> tuple[Free, np.ndarray]:
+    """Return a function of two arguments with the ranges of other recordings."""
+    assert one.across is not None
+    moved = dataclasses.replace(one, family=family, across=across)
+    ranges = Bivariate(one.family, one.across), Bivariate(family, across)
+    grid = [np.linspace(f.low, f.high, _SIDE) for f in (family, across)]
+    pairs = [at.ravel() for at in np.meshgrid(*grid)]
+    old, new = (each.basis(*pairs) for each in ranges)
+    return moved, np.linalg.lstsq(new, old @ numbers, rcond=1e-6)[0]
 
 
 def _alike(family: Family, families: dict[str, Family]) -> Family | None:

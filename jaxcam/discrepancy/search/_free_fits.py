@@ -207,7 +207,7 @@ class FreeFits:
             )
             columns = [subset.problem.names.index(name) for name in one.coefficients]
             value = np.asarray(point.values)[0][columns]
-            rough = roughness(*quadratic, one.family, value, self.policy)
+            rough = roughness(*quadratic, one.prior, value, self.policy)
             found.append(dataclasses.replace(one, roughness=rough))
         return tuple(found)
 

@@ -24,10 +24,10 @@ from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
 from ._leads import Lead, Leads
 from ._left_out import LeftOut
-from ._product_search import Products
 from ._recentre import recentred
 from ._rooms import Rooms
 from ._shuffled import Shuffled, shuffled
+from ._two_arguments import TwoArguments
 
 
 class FreeSearch:
@@ -81,8 +81,9 @@ class FreeSearch:
             self.fits, self.terms, lambda found: rooms.of(found).whole, policy
         )
         self.leads = Leads(self.fits, self.families, faults, policy, progress)
-        both = self.rooms.plain
-        self.products = Products(self.fits, families, both, progress, self.clock)
+        self.of_two = TwoArguments(
+            self.fits, families, self.rooms, progress, self.clock
+        )
 
     def repeated(self, elements: bool) -> "FreeSearch":
         """Return a search with elements among the candidates, or with functions alone;
@@ -104,7 +105,7 @@ class FreeSearch:
         if found is None or not self.first:
             return found
         least, small = self.first[0].gain + self._least(), self._small(found)
-        trials = self.products.tried(bare, found, least, small)
+        trials = self.of_two.tried(bare, found, least, small)
         self.tried += trials
         return min((found, *trials), key=lambda trial: trial.score)
 

@@ -13,7 +13,7 @@ from ._blocks import Blocks, blocks_of, moved, values_of
 from ._free_fits import FreeFits, Missing, Subset
 from ._gains import added_gain, distinct_step, gain
 from ._heat import heat_of
-from ._slots import emptied, filled, Part
+from ._slots import emptied, filled, Part, replaced
 
 
 class Without(NamedTuple):
@@ -54,8 +54,7 @@ class LeftOut:
         values, problem = found.fit.point.values, self.problem_of(found)
         if isinstance(out, str):
             rows = [problem.names.index(name) for name in self.strengths[out]]
-            values = np.asarray(values).copy()
-            values[:, rows] = 0.0
+            values = replaced(values, rows, 0.0)
         else:
             values = emptied(problem, values, out.slot)
         point = found.fit.point._replace(values=values)

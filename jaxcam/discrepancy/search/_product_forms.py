@@ -1,4 +1,4 @@
-"""Find products of two parametric forms that resemble a surface.
+"""Find products of two parametric forms that resemble a function of two arguments.
 
 The forms of either argument are compared in turn on a grid of their parameters, with
 the other form fixed; the size of the product is eliminated. The most promising products
@@ -15,9 +15,9 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from ..terms import Family, Gate, Place, Primitive
-from ._curve_likelihood import CurveLikelihood
+from ._bivariate_likelihood import BivariateLikelihood, Nodes
+from ._curve_likelihood import sines_of, starts_of
 from ._roughness import beside
-from ._surfaces import Nodes, SurfaceLikelihood
 
 
 # Number of rounds in which the factors of the closest product of curves are improved
@@ -84,16 +84,15 @@ def form_at_nodes(
 
 
 class ProductSearch:
-    """A search for products of forms that are about as likely as a surface.
+    """A search for products of forms that are about as likely as a free function.
 
-    **Arguments:** the likelihood of the surface, and the price of a parameter.
+    **Arguments:** the likelihood of the free function, and the price of a parameter.
     """
 
-    def __init__(self, likelihood: SurfaceLikelihood, price: float):
+    def __init__(self, likelihood: BivariateLikelihood, price: float):
         self.likelihood, self.price = likelihood, price
-        surface = likelihood.surface
-        self.families = surface.first, surface.second
-        size = int(np.prod(surface.shape))
+        self.families = tuple(likelihood.family)
+        size = int(np.prod(likelihood.family.shape))
         whole = likelihood.information.reshape(size, size)
         values, vectors = np.linalg.eigh(whole)
         kept = values > 0
@@ -111,7 +110,7 @@ class ProductSearch:
         return rescored(self.likely(), nodes, self.price, alike)
 
     def likely(self) -> list[ProductStart]:
-        """Return products in order of the gains that the surface predicts."""
+        """Return products in order of the gains that the free function predicts."""
         guesses = sorted(self._guesses(), key=lambda one: -one.gain)
         found = [self._refined(one) for one in guesses[:_REFINED]]
         found = [one for one in found if one.sensible]
@@ -123,24 +122,26 @@ class ProductSearch:
         """Return the coefficients of the curve that is closest to a form of the first
         or the second argument.
         """
-        count = self.likelihood.surface.shape[side]
-        none = np.zeros((0, 0))
-        bare = CurveLikelihood(self.families[side], none, np.zeros(count), 0.0, 0.0)
-        return bare.sines_of(form, numbers[None])[0]
+        return self._sines_of(side, form, numbers[None])[0]
 
     def _grid(self, side: int) -> list[tuple[Primitive, np.ndarray, np.ndarray]]:
         """Return the forms of one argument, with all starting values and the
         coefficients of the closest sums of sines.
         """
-        family, count = self.families[side], self.likelihood.surface.shape[side]
-        none = np.zeros((count, count))
-        bare = CurveLikelihood(family, none, np.zeros(count), 0.0, self.price)
         found = []
-        for form in family.primitives:
-            starts = bare.starts_of(form)
+        for form in self.families[side].primitives:
+            starts = starts_of(form)
             starts = starts[[form.within(own) for own in starts]]
-            found.append((form, starts, bare.sines_of(form, starts)))
+            found.append((form, starts, self._sines_of(side, form, starts)))
         return found
+
+    def _sines_of(self, side: int, form: Primitive, numbers) -> np.ndarray:
+        """Return the coefficients of one argument that are closest to a form, for
+        several sets of its parameters.
+        """
+        family, count = self.families[side], self.likelihood.family.shape[side]
+        every = count if family.jumps else count + 1
+        return sines_of(family, every, form, numbers)[:, :count]
 
     def _beside(self, curve: np.ndarray, side: int):
         """Return information and slope of the function on one side, given the curve of
@@ -154,11 +155,11 @@ class ProductSearch:
         return inside, curve @ slope
 
     def _curves(self) -> list[np.ndarray]:
-        """Return the two curves whose product is closest to the surface."""
-        rough, surface = self.likelihood.rough, self.likelihood.surface
-        shape = surface.shape
+        """Return the two curves whose product is closest to the free function."""
+        rough, family = self.likelihood.rough, self.likelihood.family
+        shape = family.shape
         size = int(np.prod(shape))
-        spread = rough.size**2 * surface.variances(size, rough.length)
+        spread = rough.size**2 * family.prior_variances(size, rough.length)
         limit = 1 / np.maximum(spread, np.max(spread) * np.finfo(float).eps)
         whole = self.likelihood.information.reshape(size, size) + np.diag(limit)
         mean = np.linalg.solve(whole, self.likelihood.slope.ravel()).reshape(shape)

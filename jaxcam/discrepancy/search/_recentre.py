@@ -11,12 +11,12 @@ import math
 import numpy as np
 
 from ..terms import Factor, free_basis
+from ._bivariate_likelihood import Nodes
 from ._free_fits import FreeFits, Missing, Subset
 from ._gains import added_gain, newton_step
 from ._heat import heat_of, heated
 from ._local_force import force_response, forces_at_nodes
 from ._slots import emptied, filled, Free, free_term
-from ._surfaces import Nodes
 
 
 # Number of points at which the two functions are compared
@@ -31,7 +31,11 @@ def recentred(fits: FreeFits, found: Missing) -> Missing:
     """Return the fit with one stiffness about another centre, instead of a stiffness
     and a force or of a stiffness alone, if that has more evidence.
     """
-    curves = [f for f in found.functions if isinstance(f, Free) and f.smooth]
+    curves = [
+        f
+        for f in found.functions
+        if isinstance(f, Free) and f.smooth and f.across is None
+    ]
     for one in curves:
         if one.family.factor is not Factor.DEFLECTION:
             continue

@@ -1,4 +1,4 @@
-"""A problem with room for functions, and for an element only in fits that have one."""
+"""A problem with room for functions, and for others only in fits that have them."""
 
 import dataclasses
 import functools
@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from ...fitting import Problem
 from ...fitting.engine import separated
-from ..terms import Family, Where
+from ..terms import Bivariate, Family, Where
+from ._bivariate_likelihood import bivariate_forces
 from ._free_fits import Missing
 from ._hidden_signals import Driven, driven_by
-from ._slots import roomy
+from ._slots import ROOM_OF_TWO_ARGUMENTS, roomy
 
 
 class Room(NamedTuple):
@@ -20,6 +21,11 @@ class Room(NamedTuple):
 
     apart: Problem
     whole: Problem
+
+    @property
+    def stages(self) -> tuple[Problem, ...]:
+        """Return the problems in the order in which a force is fitted to them."""
+        return (self.whole,) if self.apart is self.whole else (self.apart, self.whole)
 
 
 class Rooms:
@@ -41,10 +47,10 @@ class Rooms:
         self.driven = driven_by(problem, unit) if element else None
         self.plain = self._with(None)
 
-    def _with(self, driven: Driven | None) -> Room:
+    def _with(self, driven: Driven | None, bivariate: Bivariate | None = None) -> Room:
         at_impacts = [f for f in self._families if f.where is Where.IMPACT]
         gaps = sorted({one.constraint for one in at_impacts})
-        whole = roomy(self._problem, self._families[0], gaps, driven)
+        whole = roomy(self._problem, self._families[0], gaps, driven, bivariate)
         if self._roughly:
             return Room(whole, whole)
         return Room(dataclasses.replace(whole, extras=separated(whole.extras)), whole)
@@ -54,7 +60,14 @@ class Rooms:
         """Return the problems with room for an element."""
         return self._with(self.driven)
 
+    @functools.cached_property
+    def with_two_arguments(self) -> Room:
+        """Return the problems with room for a force of two arguments."""
+        return self._with(None, bivariate_forces(self._families)[0])
+
     def of(self, found: Missing) -> Room:
         """Return the problems that have the parameters of a fit."""
+        if ROOM_OF_TWO_ARGUMENTS in {one.slot for one in found.functions}:
+            return self.with_two_arguments
         plain = found.problem.names == self.plain.whole.names
         return self.plain if plain else self.with_element

@@ -27,12 +27,7 @@ class Roughness(NamedTuple):
 class Varied(Protocol):
     """A function, of one argument or several, with a prior of given length."""
 
-    @property
-    def jumps(self) -> bool:
-        """Whether the function has a coefficient for its jump at zero velocity."""
-        ...
-
-    def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
+    def prior_variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
         """Return the variances of the coefficients of a function of variance one."""
         ...
 
@@ -53,19 +48,18 @@ def roughness(
     Learning 2006, eq. 2.30, here expressed by information and score.
 
     **Arguments:** information and score without the prior of the coefficients; rows of
-    the free parameters, and of the coefficients of the function, of which the last is
-    its jump at zero velocity; the values of these coefficients at the point; the
-    policy. The gain is relative to the likelihood at the point.
+    the free parameters, and of the coefficients of the function; the values of these
+    coefficients at the point; the policy. The gain is relative to the likelihood at the
+    point.
     """
     inside, pull = beside(information, score, free, own, policy.distinct_information)
-    count = len(own) - 1
     seen = float(np.trace(inside))
     if not seen > 0:
         return Roughness(-math.inf, max(policy.function_lengths), 1.0)
     unit = math.sqrt(len(own) / seen)
     best = Roughness(-math.inf, max(policy.function_lengths), unit)
     for length in policy.function_lengths:
-        variances = np.append(family.variances(count, length), float(family.jumps))
+        variances = family.prior_variances(len(own), length)
         sizes = unit * np.asarray(policy.function_sizes)
         gains = _gains(inside, pull, np.sqrt(variances), sizes, value)
         for size, found in zip(sizes, gains):

@@ -12,14 +12,14 @@ from jaxtyping import Float, Int
 
 from ...fitting import Problem
 from ..policy import Policy
-from ..terms import Where
+from ..terms import Bivariate, Where
+from ._bivariate_likelihood import bivariate_at_nodes, Nodes
 from ._free_fits import FreeFits, Missing
 from ._heat import heat_of, heated
 from ._local_force import force_response, forces_at_nodes, Response
 from ._product_forms import form_at_nodes
 from ._roughness import roughness
 from ._slots import emptied, filled, Free, free_term
-from ._surfaces import Nodes
 
 
 # Shortest and longest shift of a block, as a fraction of its recording
@@ -87,7 +87,7 @@ def _shares(
     def gain(forces) -> float:
         zero = np.zeros(forces.shape[-1])
         quadratic = nodes.quadratic(forces)
-        return max(roughness(*quadratic, one.family, zero, policy).gain, 0.0)
+        return max(roughness(*quadratic, one.prior, zero, policy).gain, 0.0)
 
     whole = gain(forces)
     if not whole > 0:
@@ -103,6 +103,8 @@ def _functions(nodes: Nodes, found: Missing, one: Free) -> Float[np.ndarray, "r 
     """Return the functions of which a force consists at the nodes of all pieces; those
     of a product have its second form as a factor.
     """
+    if isinstance(one.prior, Bivariate):
+        return bivariate_at_nodes(nodes, one.prior)
     term = free_term(one.family, "new")
     forces = forces_at_nodes(nodes.response, [term])
     if one.gate is None or one.primitive is None:

@@ -16,7 +16,10 @@ from jaxtyping import Array
 from ...fitting import Model, Problem
 from ...fitting.engine import parameter_places
 from ..terms import (
+    Bivariate,
+    BivariateForce,
     Family,
+    FittedFunction,
     FREE,
     FreeFunction,
     Gate,
@@ -42,6 +45,8 @@ _SUBSTEPS = 8
 # Number of slots for functions of each kind in a problem
 _ROOM = ((Where.FLIGHT, "force_a"), (Where.FLIGHT, "force_b"))
 _ROOM_OF_SENSOR = ((Where.SENSOR, "sensor_a"),)
+ROOM_OF_TWO_ARGUMENTS = "bivariate_force"
+"""Label of the slot for a force of two arguments."""
 # slots at each gap, whose number is appended to the labels
 _ROOM_OF_IMPACTS = ((Where.IMPACT, "restitution"), (Where.CONTACT, "surface"))
 
@@ -52,7 +57,8 @@ class Free:
 
     With a `primitive`, the function has that form and no smoothness prior. With a
     `gate`, it is the product of that form and a second one. If it is `centred`, the
-    centre of its family was fitted.
+    centre of its family was fitted. With `across`, it is a function of the arguments of
+    both families.
     """
 
     family: Family
@@ -61,9 +67,19 @@ class Free:
     primitive: Primitive | None = None
     gate: Gate | None = None
     centred: bool = False
+    across: Family | None = None
+
+    @property
+    def prior(self) -> Family | Bivariate:
+        """Return the family of all functions of the same arguments."""
+        if self.across is None:
+            return self.family
+        return Bivariate(self.family, self.across)
 
     @property
     def label(self) -> str:
+        if self.across is not None:
+            return self.prior.name
         if self.gate is None:
             return self.family.name
         return f"{self.family.name} times {self.gate.family.argument}"
@@ -81,6 +97,8 @@ class Free:
     @property
     def arguments(self) -> tuple[str, ...]:
         """Return the names of all arguments."""
+        if self.across is not None:
+            return self.prior.arguments
         more = () if self.gate is None else self.gate.family.arguments
         return tuple(dict.fromkeys((*self.family.arguments, *more)))
 
@@ -113,6 +131,8 @@ class Free:
     @property
     def coefficients(self) -> list[str]:
         """Return the names of the function's parameters in the fit."""
+        if isinstance(self.prior, Bivariate):
+            return [f"{self.slot}_{k}" for k in self.prior.places]
         sines = _SINES[self.family.where] + 1
         count = self.primitive.count if self.primitive else sines
         places = (*range(count), *(self.gate.places if self.gate else ()))
@@ -124,7 +144,9 @@ class Free:
         significant changes of the parameters of a form.
         """
         if self.primitive is None:
-            return spread_of(self.family, self.roughness)
+            count = len(self.coefficients)
+            variances = self.prior.prior_variances(count, self.roughness.length)
+            return self.roughness.size * np.sqrt(variances)
         more = () if self.gate is None else self.gate.primitive.scales
         return np.array([self.roughness.size, *self.primitive.scales, *more])
 
@@ -144,7 +166,11 @@ Part: TypeAlias = Free | Hidden
 
 
 def roomy(
-    problem: Problem, family: Family, gaps: Sequence[int], driven: Driven | None
+    problem: Problem,
+    family: Family,
+    gaps: Sequence[int],
+    driven: Driven | None,
+    bivariate: Bivariate | None = None,
 ) -> Problem:
     """Return the problem with empty slots for free functions and a hidden element, and
     with the possible errors of the first coordinate's sensor as parameters.
@@ -153,9 +179,11 @@ def roomy(
 
     **Arguments:** any family, which fills the slots initially; the indices of the gaps
     at which functions may act; the position that drives a hidden element, if it is
-    measured.
+    measured; the arguments of a force of two arguments, whose slot replaces that of the
+    first force.
     """
-    room = [(where, label, 0) for where, label in (*_ROOM, *_ROOM_OF_SENSOR)]
+    forces = _ROOM if bivariate is None else _ROOM[1:]
+    room = [(where, label, 0) for where, label in (*forces, *_ROOM_OF_SENSOR)]
     for gap in gaps:
         room += [
             (where, f"{label}_{gap + 1}", gap) for where, label in _ROOM_OF_IMPACTS
@@ -168,6 +196,8 @@ def roomy(
         )
         for where, label, gap in room
     ]
+    if bivariate is not None:
+        empty.append(BivariateForce.of(bivariate, ROOM_OF_TWO_ARGUMENTS))
     if driven is not None:
         empty.append(HiddenForce.empty(*driven.position.shape))
     faults = more_faults(problem.model, problem.parameters)
@@ -213,12 +243,11 @@ def free_term(
     return FREE[family.where].of(family, label, zero, primitive, gate)
 
 
-def spread_of(family: Family, roughness: Roughness) -> np.ndarray:
-    """Return the prior standard deviations of the coefficients of a function, the jump
-    last.
-    """
-    variances = family.variances(_SINES[family.where], roughness.length)
-    return roughness.size * np.sqrt(np.append(variances, float(family.jumps)))
+def _empty(one: Free) -> FittedFunction:
+    """Return a function with its forms, and zero parameters."""
+    if isinstance(one.prior, Bivariate):
+        return BivariateForce.of(one.prior, one.slot)
+    return free_term(one.family, one.slot, one.primitive, one.gate)
 
 
 def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> Problem:
@@ -228,11 +257,11 @@ def filled(problem: Problem, functions: Sequence[Part], prior: bool = True) -> P
             problem = with_hidden(problem, one)
             continue
         place = _place(problem, one.slot)
-        fresh = free_term(one.family, one.slot, one.primitive, one.gate)
+        fresh = _empty(one)
 
         def put(model: Model, place=place, fresh=fresh) -> Model:
             old = terms_of(model)[place]
-            assert isinstance(old, FreeFunction)
+            assert isinstance(old, FittedFunction)
             new = eqx.tree_at(lambda t: t.coefficients, fresh, old.coefficients)
             return eqx.tree_at(lambda m: terms_of(m)[place], model, new)
 
@@ -286,6 +315,6 @@ def replaced(values, columns, numbers) -> Array:
 
 def _place(problem: Problem, slot: str) -> int:
     for place, term in enumerate(terms_of(problem.model)):
-        if isinstance(term, FreeFunction | HiddenForce) and term.label == slot:
+        if isinstance(term, FittedFunction | HiddenForce) and term.label == slot:
             return place
     raise ValueError(f"There is no slot {slot!r} for a free function.")

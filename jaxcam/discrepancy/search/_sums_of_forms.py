@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..terms import BACKWARD, DRY, FORWARD, MOST_PARTS, Primitive, sum_of
-from ._curve_likelihood import CurveLikelihood, Start, Vectors
+from ._curve_likelihood import CurveLikelihood, Start, starts_of, Vectors
 from ._named_parts import without_friction
 
 
@@ -161,7 +161,7 @@ class SumSearch:
     def _grid(self) -> _Grid:
         forms, rows, numbers, seen, first = [], [], [], [], 0
         for form in self.likelihood.family.summands:
-            starts = self.likelihood.starts_of(form)
+            starts = starts_of(form)
             starts = starts[[form.within(own) for own in starts]]
             here = self.vectors.seen(form, starts)
             size = np.linalg.norm(here, axis=1)

@@ -4,6 +4,7 @@ A `Term` has one or more strengths; a `Shape` is a free function that shows wher
 physics is missing and on what it depends.
 """
 
+from ._bivariate import Bivariate as Bivariate, BivariateForce as BivariateForce
 from ._coordinates import coordinates as coordinates
 from ._families import (
     Factor as Factor,
@@ -11,6 +12,7 @@ from ._families import (
     Family as Family,
     free_basis as free_basis,
 )
+from ._fitted_function import FittedFunction as FittedFunction
 from ._free_function import (
     FREE as FREE,
     FreeFunction as FreeFunction,

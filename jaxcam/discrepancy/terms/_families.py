@@ -166,6 +166,13 @@ class Family:
         squares = np.where(constant, 1.0, 0.5)
         return density / np.sum(squares * density)
 
+    def prior_variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
+        """Return the variances of all coefficients; that of a jump, if the functions
+        may jump, is one.
+        """
+        found = self.variances(count - 1, length)
+        return np.append(found, float(self.jumps))
+
 
 def free_basis(
     family: Family, at: Float[np.ndarray, " n"], count: int

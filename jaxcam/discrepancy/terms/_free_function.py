@@ -14,14 +14,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ...fitting import Parameter
 from ._families import Factor, Family
+from ._fitted_function import FittedFunction
 from ._free_splines import BEYOND, interpolated, knots_of, splines
 from ._parametric_form import MOST_PARTS, Primitive
 from ._primitives import PRIMITIVES
 from ._products import Gate, GATE_PLACES
 from ._shapes import Variable
-from ._term import Motion, Term, terms_of
+from ._term import Motion, Term
 from ._where import Where
 
 
@@ -45,7 +45,7 @@ def _numbers(values) -> tuple[Array, ...]:
     return tuple(jnp.asarray(value, dtype=float) for value in values)
 
 
-class FreeFunction(Term):
+class FreeFunction(FittedFunction):
     """A function of any family, selected by the values of its arrays.
 
     It is a sum of sines if the first of `forms` is zero. Otherwise it is the sum of the
@@ -63,8 +63,6 @@ class FreeFunction(Term):
     the `coefficients` of the first (see `Gate`).
     """
 
-    sentence: ClassVar[str] = "an unnamed function"
-    listed: ClassVar[bool] = False
     label: str = eqx.field(static=True)
     coefficients: tuple[Array, ...] = eqx.field(converter=_numbers)
     rates: Float[Array, " k"]
@@ -139,14 +137,6 @@ class FreeFunction(Term):
         """
         rates, shifts = family.waves(len(coefficients) - 1)
 
-        def chosen(options, one):
-            return jnp.array([float(option is one) for option in options])
-
-        # the argument is the approach speed for a restitution, the velocity for a force
-        argument = family.argument
-        if argument is Variable.APPROACH:
-            argument = Variable.VELOCITY
-
         return cls(
             label=label,
             coefficients=tuple(coefficients),
@@ -154,8 +144,8 @@ class FreeFunction(Term):
             shifts=shifts,
             low=jnp.asarray(family.low),
             high=jnp.asarray(family.high),
-            picks=chosen(_ARGUMENTS, argument),
-            factors=chosen(_FACTORS, family.factor),
+            picks=pick_of(family),
+            factors=_chosen(_FACTORS, family.factor),
             middle=jnp.asarray(family.middle),
             slip=jnp.asarray(family.slip),
             stride=jnp.asarray(family.stride),
@@ -210,22 +200,7 @@ class FreeFunction(Term):
         return soft + jax.lax.stop_gradient(value - soft)
 
     def _argument(self, motion: Motion, speed):
-        options = (motion.position, speed, motion.phase, motion.t)
-        return sum(w * option for w, option in zip(self.picks, options))
-
-    def numbers(self) -> tuple[Array, ...]:
-        return self.coefficients
-
-    def parameters(self, place: int) -> list[Parameter]:
-        return [
-            Parameter(
-                f"{self.label}_{k}",
-                lambda m, k=k: terms_of(m)[place].coefficients[k],  # pyright: ignore
-                nominal=0.0,
-                scale=1.0,
-            )
-            for k in range(len(self.coefficients))
-        ]
+        return picked(self.picks, motion, speed)
 
 
 class FreeForce(FreeFunction):
@@ -280,6 +255,25 @@ FREE: dict[Where, type[FreeFunction]] = {
     Where.CONTACT: FreeSurface,
     Where.SENSOR: FreeSensor,
 }
+
+
+def pick_of(family: Family) -> Float[Array, " a"]:
+    """Return the weights that select the argument of a family."""
+    # the argument is the approach speed for a restitution, the velocity for a force
+    argument = family.argument
+    if argument is Variable.APPROACH:
+        argument = Variable.VELOCITY
+    return _chosen(_ARGUMENTS, argument)
+
+
+def picked(picks: Float[Array, " a"], motion: Motion, speed):
+    """Return the argument that weights select."""
+    options = (motion.position, speed, motion.phase, motion.t)
+    return sum(w * option for w, option in zip(picks, options))
+
+
+def _chosen(options, one) -> Float[Array, " a"]:
+    return jnp.array([float(option is one) for option in options])
 
 
 def prepared_terms(terms: Sequence[Term]) -> tuple[Term, ...]:

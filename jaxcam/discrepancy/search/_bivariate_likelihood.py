@@ -1,8 +1,7 @@
-"""Forces that are functions of two arguments, judged by a quadratic likelihood.
+"""The quadratic likelihood of forces that are functions of two arguments.
 
-A surface is a sum of products of the sines (or harmonics) of its two arguments. It is
-linear in its coefficients, so one linearisation of the recordings predicts its gain. No
-surface is fitted to trajectories: it shows which products of forms may be worth a fit.
+They are linear in their coefficients, so one linearisation of the recordings predicts
+their gains, and shows which products of forms may be worth a fit.
 """
 
 from collections.abc import Sequence
@@ -15,17 +14,14 @@ from jaxtyping import Array, Float
 
 from ...fitting import Parameter, Problem
 from ..policy import Policy
-from ..terms import Factor, Family, free_basis, Motion, Term, Variable, Where
+from ..terms import Bivariate, Factor, Family, Motion, Term, Variable, Where
 from ._local_force import blocks_at_nodes, forces_at_nodes, Response
 from ._roughness import beside, Roughness, roughness
 
 
-# Number of sines of each argument, and of harmonics with their constant; one more
-# coefficient represents a jump
-_SINES, _HARMONICS = 10, 9
-# Number of coefficients of every surface, so that all share one compiled program; the
-# last one has no effect
-_WIDTH = (_SINES + 1) ** 2 + 1
+# Number of forces whose likelihood is computed at once, so that all functions share one
+# compiled program
+_WIDTH = 121
 # Arguments that may be combined
 _COMBINED = (
     (Variable.VELOCITY, Variable.POSITION),
@@ -98,92 +94,58 @@ class Nodes(NamedTuple):
         return at, slow
 
 
-class Surface(NamedTuple):
-    """A function of the arguments of two families.
-
-    It stands for a family in the choice of a smoothness prior.
-    """
-
-    first: Family
-    second: Family
-
-    @property
-    def jumps(self) -> bool:
-        return False
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Return the number of coefficients of each argument."""
-        return _count(self.first), _count(self.second)
-
-    def variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
-        """Return the variances of the coefficients of a surface of variance one."""
-        one, other = (_variances(f, length) for f in (self.first, self.second))
-        found = np.outer(one, other).ravel()
-        return np.pad(found, (0, count - len(found)))
-
-    def basis(self, nodes: Nodes) -> Float[np.ndarray, "r k l p"]:
-        """Return the contribution of each coefficient at the nodes, padded by zeros."""
-        one, other = (_basis(f, nodes) for f in (self.first, self.second))
-        every = one[..., :, None] * other[..., None, :]
-        every = every.reshape(*every.shape[:-2], -1)
-        return np.pad(every, [(0, 0)] * 3 + [(0, _WIDTH - every.shape[-1])])
-
-
-class SurfaceLikelihood(NamedTuple):
-    """The likelihood of the coefficients of a surface, all other parameters eliminated.
+class BivariateLikelihood(NamedTuple):
+    """The likelihood of the coefficients of a force of two arguments, all other
+    parameters eliminated.
 
     `information` `(a, b, a, b)` and `slope` `(a, b)`, divided by the cost per sample;
     `rough`: the smoothness prior, with the predicted gain.
     """
 
-    surface: Surface
+    family: Bivariate
     information: Float[np.ndarray, "a b a b"]
     slope: Float[np.ndarray, "a b"]
     rough: Roughness
 
 
-def surfaces_of(families: Sequence[Family]) -> list[Surface]:
-    """Return the surfaces of the arguments that may be combined."""
+def bivariate_forces(families: Sequence[Family]) -> list[Bivariate]:
+    """Return the forces of all pairs of arguments that may be combined."""
     alone = {
         f.argument: f
         for f in families
         if f.where is Where.FLIGHT and f.factor is Factor.ONE
     }
     return [
-        Surface(alone[one], alone[other])
+        Bivariate(alone[one], alone[other])
         for one, other in _COMBINED
         if one in alone and other in alone
     ]
 
 
-def likelihood_of(nodes: Nodes, surface: Surface, policy: Policy) -> SurfaceLikelihood:
-    """Return the likelihood of a surface about the point of a response."""
-    quadratic = nodes.quadratic(surface.basis(nodes))
-    # the last coefficients are padding
-    rough = roughness(*quadratic, surface, np.zeros(_WIDTH), policy)
+def likelihood_of(
+    nodes: Nodes, family: Bivariate, policy: Policy
+) -> BivariateLikelihood:
+    """Return the likelihood of a force of two arguments about the point of a response,
+    where it is zero.
+    """
+    forces = bivariate_at_nodes(nodes, family)
+    used = forces.shape[-1]
+    padding = [(0, 0)] * 3 + [(0, _WIDTH - used)]
+    information, score, free, own = nodes.quadratic(np.pad(forces, padding))
+    quadratic = information, score, free, own[:used]
+    rough = roughness(*quadratic, family, np.zeros(used), policy)
     inside, pull = beside(*quadratic, policy.distinct_information)
-    used = int(np.prod(surface.shape))
-    shape = surface.shape
-    return SurfaceLikelihood(
-        surface,
-        inside[:used, :used].reshape(*shape, *shape),
-        pull[:used].reshape(shape),
-        rough,
+    shape = family.shape
+    return BivariateLikelihood(
+        family, inside.reshape(*shape, *shape), pull.reshape(shape), rough
     )
 
 
-def _count(family: Family) -> int:
-    return 1 + (_HARMONICS if family.periodic else _SINES)
-
-
-def _variances(family: Family, length: float) -> np.ndarray:
-    own = family.variances(_count(family) - 1, length)
-    return np.append(own, float(family.jumps))
-
-
-def _basis(family: Family, nodes: Nodes) -> Float[np.ndarray, "r k l p"]:
-    at, _ = nodes.place(family)
-    inside = np.clip(at, family.low, family.high)
-    found = free_basis(family, inside.ravel(), _count(family))
-    return found.reshape(*at.shape, -1)
+def bivariate_at_nodes(nodes: Nodes, family: Bivariate) -> Float[np.ndarray, "r k l p"]:
+    """Return the contribution of each coefficient of a force at the nodes."""
+    at = []
+    for one in family:
+        place, _ = nodes.place(one)
+        at.append(np.clip(place, one.low, one.high))
+    found = family.basis(*(one.ravel() for one in at))
+    return found.reshape(*at[0].shape, -1)

@@ -1,0 +1,163 @@
+"""Try forces that depend on two arguments: products of two forms, and free functions.
+
+They are tried only if the functions of one argument leave something to explain, and if
+a free function of two arguments promises more than the best function of one.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..terms import Bivariate, Family
+from ._bivariate_likelihood import (
+    bivariate_forces,
+    BivariateLikelihood,
+    likelihood_of,
+    Nodes,
+)
+from ._clock import Clock
+from ._formulas import leaves_noise
+from ._free_fits import FreeFits, Missing, Subset
+from ._heat import heat_of, heated
+from ._local_force import force_response
+from ._product_forms import ProductSearch, ProductStart
+from ._product_search import Products
+from ._rooms import Rooms
+from ._roughness import beside, occam_of
+from ._slots import filled, Free, ROOM_OF_TWO_ARGUMENTS
+from ._starting_at import starting_at
+
+
+class TwoArguments:
+    """Fits of forces of two arguments in place of the functions that were found.
+
+    **Arguments:** the fits of subsets, families of functions of one argument, the
+    problems with room for the functions, `progress(sentence, fraction)`, and the clock.
+    """
+
+    def __init__(
+        self,
+        fits: FreeFits,
+        families: Sequence[Family],
+        rooms: Rooms,
+        progress: Callable[[str, float | None], None],
+        clock: Clock,
+    ):
+        self.fits, self.rooms, self.policy = fits, rooms, fits.policy
+        self.families = bivariate_forces(families)
+        self.progress, self.clock = progress, clock
+        self.products = Products(fits, rooms.plain, progress, clock)
+
+    def tried(
+        self, bare: Missing, found: Missing, least: float, small: float
+    ) -> list[Missing]:
+        """Return fits with a force of two arguments alone.
+
+        A single form that leaves only noise has no rival among them.
+
+        **Arguments:** the fit without functions, the fit with those found, the gain
+        that a free function of two arguments must exceed, and the tolerated residual.
+        """
+        alone = len(found.functions) == 1 and not found.names
+        whole = alone and not any(one.smooth for one in found.functions)
+        if whole and leaves_noise(self.fits, found, small):
+            return []
+        likelihoods, starts = self._promising(bare, least)
+        beaten = self.policy.form_cost * found.fit.cost
+        trials = self.products.tried(starts, bare.fit.point, beaten)
+        for likelihood in likelihoods:
+            best = min((found, *trials), key=lambda one: one.score)
+            gain = likelihood.rough.gain
+            close = gain > self.policy.rivalling * likelihoods[0].rough.gain
+            promised = bare.fit.cost - heat_of(bare.fit) * gain
+            if leaves_noise(self.fits, best, small) or self.clock.over:
+                break
+            if not close or promised > best.fit.cost:
+                break
+            free = self._free(bare, likelihood, best.fit.cost)
+            if free is not None:
+                trials += [free, *self._formulated(free, small)]
+        return trials
+
+    def _promising(
+        self, bare: Missing, least: float
+    ) -> tuple[list[BivariateLikelihood], list[ProductStart]]:
+        """Return the free functions that promise enough, and products of forms that
+        resemble them, the most promising first.
+        """
+        self.progress("searching the residuals for functions of two arguments", None)
+        heat, apart = heat_of(bare.fit), self.rooms.plain.apart
+        problem = heated(filled(apart, bare.functions), heat)
+        response = force_response(problem, bare.fit.point, self.fits.free(bare))
+        nodes = Nodes.of(problem, response, heat)
+        alike, starts = self.policy.distinct_information, []
+        every = [likelihood_of(nodes, one, self.policy) for one in self.families]
+        likelihoods = [one for one in every if one.rough.gain > least]
+        for one in likelihoods:
+            starts += ProductSearch(one, self._price).promising(nodes, alike)
+        return (
+            sorted(likelihoods, key=lambda one: -one.rough.gain),
+            sorted(starts, key=lambda one: -one.gain),
+        )
+
+    @property
+    def _price(self) -> float:
+        """Return the price of a parameter."""
+        return math.log(self.rooms.plain.whole.samples)
+
+    def _free(
+        self, bare: Missing, likelihood: BivariateLikelihood, beaten: float
+    ) -> Missing | None:
+        """Fit a free function to single pieces of flight, then to whole recordings.
+
+        **Returns:** the fit, or `None` if it does not explain more than other fits.
+        """
+        first, second = likelihood.family
+        one = Free(first, likelihood.rough, ROOM_OF_TWO_ARGUMENTS, across=second)
+        self.progress(f"fitting {one.label}", None)
+        room, trial, functions = self.rooms.with_two_arguments, None, (one,)
+        point = starting_at(bare.fit, room.whole)
+        for problem in room.stages:
+            subset = Subset(problem, functions, frozenset())
+            trial = self.fits.fitted(subset, point, self.policy.iterations, beaten)
+            point, functions = trial.fit.point, trial.functions
+            if not trial.fit.cost < beaten:
+                return None
+        assert trial is not None
+        return trial if math.isfinite(trial.score) else None
+
+    def _formulated(self, free: Missing, small: float) -> list[Missing]:
+        """Return fits with products of forms that resemble a fitted free function."""
+        likelihood, freedom = self._about(free)
+        heat, cost = heat_of(free.fit), free.fit.cost
+        worse = heat * freedom + small + self.policy.form_loss + self.policy.lead_bic
+        starts = [
+            one
+            for one in ProductSearch(likelihood, self._price).likely()
+            if heat * (likelihood.rough.gain - one.gain) < worse
+        ]
+        point = starting_at(free.fit, self.rooms.plain.whole)
+        beaten = max(self.policy.form_cost * cost, cost + small)
+        return self.products.tried(starts, point, beaten)
+
+    def _about(self, free: Missing) -> tuple[BivariateLikelihood, float]:
+        """Return the likelihood of a free function about its fit, and the price of its
+        coefficients.
+        """
+        (one,) = free.functions
+        assert isinstance(one, Free) and isinstance(one.prior, Bivariate)
+        subset = Subset(free.problem, free.functions, free.names)
+        quadratic = self.fits.quadratic(subset, free.fit.point, heat_of(free.fit), one)
+        inside, pull = beside(*quadratic, self.policy.distinct_information)
+        value = np.array([free.fit[name].value for name in one.coefficients])
+        slope = inside @ value + pull
+        gain = float(2 * value @ slope - value @ inside @ value)
+        shape = one.prior.shape
+        likelihood = BivariateLikelihood(
+            one.prior,
+            inside.reshape(*shape, *shape),
+            slope.reshape(shape),
+            one.roughness._replace(gain=gain),
+        )
+        return likelihood, occam_of(inside, one.spread)

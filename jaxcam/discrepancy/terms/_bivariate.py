@@ -1,0 +1,156 @@
+"""Forces that are free functions of two arguments, with a Gaussian process prior.
+
+They are sums of products of the functions of which functions of one argument are sums.
+The kernel of the Gaussian process is the product of the kernels of both arguments.
+"""
+
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from ._families import Family, free_basis
+from ._fitted_function import FittedFunction
+from ._free_function import pick_of, picked
+from ._term import Motion
+
+
+# Number of sines of an argument, and of harmonics of a phase with their constant; one
+# more coefficient represents a jump
+_SINES, _HARMONICS = 10, 9
+_MOST = _SINES + 1
+
+
+class Bivariate(NamedTuple):
+    """All functions of the arguments of two families."""
+
+    first: Family
+    second: Family
+
+    @property
+    def name(self) -> str:
+        """Return location and arguments, such as `flight phase and position`."""
+        return f"{self.first.name} and {self.second.argument}"
+
+    @property
+    def arguments(self) -> tuple[str, str]:
+        """Return the names of both arguments."""
+        return str(self.first.argument), str(self.second.argument)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Return the number of coefficients of each argument."""
+        return _count(self.first), _count(self.second)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Return the indices of the coefficients that are used, among those of a
+        `BivariateForce`.
+        """
+        one, other = self.shape
+        return tuple(_MOST * i + j for i in range(one) for j in range(other))
+
+    def prior_variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
+        """Return the variances of the coefficients of a function of variance one."""
+        one, other = (
+            f.prior_variances(_sines(f) + 1, length)[: _count(f)] for f in self
+        )
+        found = np.outer(one, other).ravel()
+        assert len(found) == count
+        return found
+
+    def basis(self, along, across) -> Float[np.ndarray, "n p"]:
+        """Return the contribution of each coefficient at `n` pairs of arguments."""
+        one, other = (
+            free_basis(f, np.asarray(at), _sines(f) + 1)[:, : _count(f)]
+            for f, at in zip(self, (along, across))
+        )
+        return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
+
+
+class _Axis(eqx.Module):
+    """One of the arguments: the sines of which a function consists, and its range."""
+
+    rates: Float[Array, " k"]
+    shifts: Float[Array, " k"]
+    low: Float[Array, ""]
+    high: Float[Array, ""]
+    picks: Float[Array, " a"]
+    slip: Float[Array, ""]
+    jumping: Float[Array, ""]
+    periodic: Bool[Array, ""]
+
+    @classmethod
+    def of(cls, family: Family):
+        waves = family.waves(_sines(family))
+        rates, shifts = (jnp.pad(one, (0, _SINES - len(one))) for one in waves)
+        return cls(
+            rates,
+            shifts,
+            jnp.asarray(family.low),
+            jnp.asarray(family.high),
+            pick_of(family),
+            jnp.asarray(family.slip),
+            jnp.asarray(float(family.jumps)),
+            jnp.asarray(family.periodic),
+        )
+
+    def argument(self, motion: Motion):
+        return picked(self.picks, motion, motion.velocity)
+
+    def functions(self, at) -> Float[Array, " k"]:
+        """Return the functions of the argument, the jump last."""
+        width = self.high - self.low
+        inside = jnp.clip(at, self.low, self.high)
+        inside = jnp.where(self.periodic, self.low + (at - self.low) % width, inside)
+        jump = self.jumping * jnp.tanh(at / self.slip)
+        return jnp.append(jnp.sin(self.rates * inside + self.shifts), jump)
+
+
+class BivariateForce(FittedFunction):
+    """A free function of two arguments that is added to the acceleration.
+
+    **Arguments:** `label` of the parameters; `coefficients` of the products of the
+    functions of both arguments, row by row; both arguments.
+    """
+
+    name: ClassVar[str] = "bivariate_force"
+    label: str = eqx.field(static=True)
+    coefficients: tuple[Array, ...] = eqx.field(
+        converter=lambda values: tuple(jnp.asarray(x, dtype=float) for x in values)
+    )
+    first: _Axis
+    second: _Axis
+
+    @classmethod
+    def of(cls, family: Bivariate, label: str, coefficients=None):
+        """Return a function with given coefficients, zero by default."""
+        return cls(
+            label=label,
+            coefficients=[0.0] * _MOST**2 if coefficients is None else coefficients,
+            first=_Axis.of(family.first),
+            second=_Axis.of(family.second),
+            motion_unit=family.first.motion_unit,
+        )
+
+    def acceleration(self, motion: Motion):
+        one, other = (
+            a.functions(a.argument(motion)) for a in (self.first, self.second)
+        )
+        return one @ jnp.stack(self.coefficients).reshape(_MOST, _MOST) @ other
+
+    def slopes(self, along, across) -> Float[Array, " p"]:
+        """Return the derivatives with respect to all coefficients."""
+        one, other = self.first.functions(along), self.second.functions(across)
+        return jnp.outer(one, other).ravel()
+
+
+def _sines(family: Family) -> int:
+    return _HARMONICS if family.periodic else _SINES
+
+
+def _count(family: Family) -> int:
+    """Return the number of functions of an argument."""
+    return _sines(family) + int(family.jumps)
