@@ -183,11 +183,30 @@ EFFECTS = {
         0.04,
         0.12,
     ),
+    # other functions of two arguments
     "moving_stop": _force(
         ("phase", "position"),
         lambda u, w, phi, t, s: -np.maximum(u - 0.4 + 0.2 * np.cos(phi), 0),
         0.2,
         0.5,
+    ),
+    "moving_belt": _force(
+        ("phase", "velocity"),
+        lambda u, w, phi, t, s: -np.tanh((w - 0.4 * np.cos(phi)) / 0.05),
+        0.02,
+        0.06,
+    ),
+    "travelling_wave": _force(
+        ("phase", "position"), lambda u, w, phi, t, s: np.cos(phi - 4 * u), 0.02, 0.06
+    ),
+    "lossy_stop": _force(
+        _ON_THE_WAY,
+        lambda u, w, phi, t, s: -(np.maximum(u - 0.4, 0) ** 1.5) * (1 + 0.8 * w),
+        0.3,
+        0.8,
+    ),
+    "late_spring": _force(
+        _ON_THE_WAY, lambda u, w, phi, t, s: -np.maximum(u + 0.3 * w - 0.3, 0), 0.2, 0.5
     ),
     # of the drive angle
     "pulse": _force(
