@@ -101,13 +101,47 @@ class FreeSearch:
         The search ends as soon as it prefers an element that is not a candidate.
         """
         bare = self._bare(self.apart, self.problem.start)
-        found = self._functions(bare)
+        trials = self._of_two_first(bare)
+        if trials and self._suffices(trials[0]):
+            return trials[0]
+        found = None if self.need.preferred else self._functions(bare)
         if found is None or not self.first:
             return found
-        least, small = self.first[0].gain + self._least(), self._small(found)
+        if not trials:
+            trials = self._of_two(bare, found)
+        return min((found, *trials), key=lambda trial: trial.score)
+
+    def _of_two_first(self, bare: Missing) -> list[Missing]:
+        """Return fits with forces of two arguments, the best first, if they promise
+        more than functions of one argument do.
+        """
+        small = heat_of(bare.fit) < self.policy.as_noise
+        if small or self.elements or not math.isfinite(bare.score):
+            return []
+        leads = self._ranked(self.apart, bare, True)
+        if self.need.preferred or not leads:
+            return []
+        least = self._least()
+        if not self.of_two.promise_more(bare, leads, least):
+            return []
+        return self._of_two(bare, bare)
+
+    def _of_two(self, bare: Missing, found: Missing) -> list[Missing]:
+        """Return fits with forces of two arguments in place of the functions found, and
+        with other functions and terms in addition, the best first.
+        """
+        assert self.first
+        least = self.first[0].gain + self._least()
+        small = self.policy.small * max(self.cost - found.fit.cost, 0.0)
         trials = self.of_two.tried(bare, found, least, small)
         self.tried += trials
-        return min((found, *trials), key=lambda trial: trial.score)
+        trials.sort(key=lambda trial: trial.score)
+        if trials and not self._suffices(trials[0]) and not self.clock.over:
+            trials.insert(0, self._pruned(self._grown(trials[0], False)))
+        return trials
+
+    def _suffices(self, found: Missing) -> bool:
+        return leaves_noise(self.fits, found, self._small(found))
 
     def _functions(self, bare: Missing) -> Missing | None:
         """Return functions of one argument and terms, or `None`."""
@@ -259,14 +293,9 @@ class FreeSearch:
                 break
             room = self.rooms.of(found)
             problem = room.apart if apart else room.whole
-            leads = self._leads(problem, found, apart)
-            if self.first is None:
-                self.first = leads
-                gains = [lead.gain for lead in leads]
-                if not self.roughly:
-                    self.need.compare(problem, found, gains, self._least())
-                if self.need.preferred:
-                    break
+            leads = self._ranked(problem, found, apart)
+            if self.need.preferred:
+                break
             best = found
             for lead in leads:
                 if self._done(best, lead, leads[0]) or self.clock.over:
@@ -289,6 +318,20 @@ class FreeSearch:
                 break
             found = best
         return found
+
+    def _ranked(self, problem: Problem, found: Missing, apart: bool) -> list[Lead]:
+        """Return the candidates to add to a fit; before anything is added, also compare
+        them with elements.
+        """
+        leads = self._leads(problem, found, apart)
+        if self.first is None:
+            self.first = leads
+            gains = [lead.gain for lead in leads]
+            if apart:
+                gains.append(self.of_two.promised(found))
+            if not self.roughly:
+                self.need.compare(problem, found, gains, self._least())
+        return leads
 
     def _done(self, best: Missing, lead: Lead, first: Lead) -> bool:
         """Return whether the data are explained so well that a candidate need not be

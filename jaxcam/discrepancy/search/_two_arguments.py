@@ -6,10 +6,12 @@ a free function of two arguments promises more than the best function of one.
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
-from ..terms import Bivariate, Family
+from ..terms import Bivariate, Family, Where
 from ._bivariate_likelihood import (
     bivariate_forces,
     BivariateLikelihood,
@@ -20,13 +22,33 @@ from ._clock import Clock
 from ._formulas import leaves_noise
 from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of, heated
-from ._local_force import force_response
+from ._leads import Lead
+from ._local_force import force_response, forces_at_nodes
 from ._product_forms import ProductSearch, ProductStart
 from ._product_search import Products
 from ._rooms import Rooms
-from ._roughness import beside, occam_of
-from ._slots import filled, Free, ROOM_OF_TWO_ARGUMENTS
+from ._roughness import beside, occam_of, roughness
+from ._slots import filled, Free, free_term, ROOM_OF_TWO_ARGUMENTS
 from ._starting_at import starting_at
+
+
+class Sum(NamedTuple):
+    """A sum of two functions of one argument each, with priors of the same length."""
+
+    first: Family
+    second: Family
+
+    def prior_variances(self, count: int, length: float) -> Float[np.ndarray, " count"]:
+        """Return the variances of the coefficients of functions of variance one."""
+        return np.concatenate([f.prior_variances(count // 2, length) for f in self])
+
+
+class _Promised(NamedTuple):
+    """The free functions of two arguments about a fit, the most promising first."""
+
+    bare: Missing
+    nodes: Nodes
+    likelihoods: list[BivariateLikelihood]
 
 
 class TwoArguments:
@@ -46,8 +68,40 @@ class TwoArguments:
     ):
         self.fits, self.rooms, self.policy = fits, rooms, fits.policy
         self.families = bivariate_forces(families)
+        self.forces = [one for one in families if one.where is Where.FLIGHT]
         self.progress, self.clock = progress, clock
         self.products = Products(fits, rooms.plain, progress, clock)
+        self._known: _Promised | None = None
+
+    def promised(self, bare: Missing) -> float:
+        """Return the largest predicted gain of a free function of two arguments."""
+        likelihoods = self._promising(bare).likelihoods
+        return likelihoods[0].rough.gain if likelihoods else 0.0
+
+    def promise_more(self, bare: Missing, leads: Sequence[Lead], least: float) -> bool:
+        """Return whether a free function of two arguments promises more than any
+        function of one argument, and than sums of two such functions.
+
+        **Arguments:** the fit without functions; the candidates of one argument, the
+        best first; and the gain by which it must exceed them.
+        """
+        promised = self.promised(bare)
+        if promised < leads[0].gain + least:
+            return False
+        nodes = self._promising(bare).nodes
+        at_nodes = {
+            one.name: forces_at_nodes(nodes.response, [free_term(one, "new")])
+            for one in self.forces
+        }
+        most = 0.0
+        for one in [lead.family for lead in leads if lead.family in self.forces]:
+            for other in self.forces:
+                if one is not None and one != other:
+                    both = np.concatenate(
+                        [at_nodes[one.name], at_nodes[other.name]], axis=-1
+                    )
+                    most = max(most, self._gain(nodes, both, Sum(one, other)))
+        return promised > most + least
 
     def tried(
         self, bare: Missing, found: Missing, least: float, small: float
@@ -63,9 +117,13 @@ class TwoArguments:
         whole = alone and not any(one.smooth for one in found.functions)
         if whole and leaves_noise(self.fits, found, small):
             return []
-        likelihoods, starts = self._promising(bare, least)
+        _, nodes, likelihoods = self._promising(bare)
+        likelihoods = [one for one in likelihoods if one.rough.gain > least]
+        starts = self._products_of(nodes, likelihoods)
         beaten = self.policy.form_cost * found.fit.cost
-        trials = self.products.tried(starts, bare.fit.point, beaten)
+        # a free function is fitted with fewer iterations than a product of wrong forms
+        likely = [one for one in starts if one.gain > likelihoods[0].rough.gain]
+        trials = self.products.tried(likely, bare.fit.point, beaten)
         for likelihood in likelihoods:
             best = min((found, *trials), key=lambda one: one.score)
             gain = likelihood.rough.gain
@@ -78,28 +136,40 @@ class TwoArguments:
             free = self._free(bare, likelihood, best.fit.cost)
             if free is not None:
                 trials += [free, *self._formulated(free, small)]
+        if not trials:
+            trials = self.products.tried(starts, bare.fit.point, beaten)
         return trials
 
-    def _promising(
-        self, bare: Missing, least: float
-    ) -> tuple[list[BivariateLikelihood], list[ProductStart]]:
-        """Return the free functions that promise enough, and products of forms that
-        resemble them, the most promising first.
+    def _promising(self, bare: Missing) -> _Promised:
+        """Return the free functions, in the order of their predicted gains."""
+        if self._known is None or self._known.bare is not bare:
+            self.progress(
+                "searching the residuals for functions of two arguments", None
+            )
+            heat, apart = heat_of(bare.fit), self.rooms.plain.apart
+            problem = heated(filled(apart, bare.functions), heat)
+            response = force_response(problem, bare.fit.point, self.fits.free(bare))
+            nodes = Nodes.of(problem, response, heat)
+            every = [likelihood_of(nodes, one, self.policy) for one in self.families]
+            every.sort(key=lambda one: -one.rough.gain)
+            self._known = _Promised(bare, nodes, every)
+        return self._known
+
+    def _gain(self, nodes: Nodes, forces: Float[np.ndarray, "r k l p"], prior) -> float:
+        """Return the predicted gain of functions given at the nodes."""
+        zero = np.zeros(forces.shape[-1])
+        return roughness(*nodes.quadratic(forces), prior, zero, self.policy).gain
+
+    def _products_of(
+        self, nodes: Nodes, likelihoods: Sequence[BivariateLikelihood]
+    ) -> list[ProductStart]:
+        """Return products of forms that resemble free functions, the most promising
+        first.
         """
-        self.progress("searching the residuals for functions of two arguments", None)
-        heat, apart = heat_of(bare.fit), self.rooms.plain.apart
-        problem = heated(filled(apart, bare.functions), heat)
-        response = force_response(problem, bare.fit.point, self.fits.free(bare))
-        nodes = Nodes.of(problem, response, heat)
-        alike, starts = self.policy.distinct_information, []
-        every = [likelihood_of(nodes, one, self.policy) for one in self.families]
-        likelihoods = [one for one in every if one.rough.gain > least]
+        alike, found = self.policy.distinct_information, []
         for one in likelihoods:
-            starts += ProductSearch(one, self._price).promising(nodes, alike)
-        return (
-            sorted(likelihoods, key=lambda one: -one.rough.gain),
-            sorted(starts, key=lambda one: -one.gain),
-        )
+            found += ProductSearch(one, self._price).promising(nodes, alike)
+        return sorted(found, key=lambda one: -one.gain)
 
     @property
     def _price(self) -> float:
@@ -117,13 +187,15 @@ class TwoArguments:
         one = Free(first, likelihood.rough, ROOM_OF_TWO_ARGUMENTS, across=second)
         self.progress(f"fitting {one.label}", None)
         room, trial, functions = self.rooms.with_two_arguments, None, (one,)
-        point = starting_at(bare.fit, room.whole)
+        point, most = starting_at(bare.fit, room.whole), beaten
         for problem in room.stages:
             subset = Subset(problem, functions, frozenset())
-            trial = self.fits.fitted(subset, point, self.policy.iterations, beaten)
+            trial = self.fits.fitted(subset, point, self.policy.iterations, most)
             point, functions = trial.fit.point, trial.functions
             if not trial.fit.cost < beaten:
                 return None
+            # what explains single pieces is worth the iterations that joints need
+            most = math.inf
         assert trial is not None
         return trial if math.isfinite(trial.score) else None
 

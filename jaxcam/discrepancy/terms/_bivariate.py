@@ -70,7 +70,7 @@ class Bivariate(NamedTuple):
         return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
 
 
-class _Axis(eqx.Module):
+class Axis(eqx.Module):
     """One of the arguments: the sines of which a function consists, and its range."""
 
     rates: Float[Array, " k"]
@@ -121,8 +121,8 @@ class BivariateForce(FittedFunction):
     coefficients: tuple[Array, ...] = eqx.field(
         converter=lambda values: tuple(jnp.asarray(x, dtype=float) for x in values)
     )
-    first: _Axis
-    second: _Axis
+    first: Axis
+    second: Axis
 
     @classmethod
     def of(cls, family: Bivariate, label: str, coefficients=None):
@@ -130,8 +130,8 @@ class BivariateForce(FittedFunction):
         return cls(
             label=label,
             coefficients=[0.0] * _MOST**2 if coefficients is None else coefficients,
-            first=_Axis.of(family.first),
-            second=_Axis.of(family.second),
+            first=Axis.of(family.first),
+            second=Axis.of(family.second),
             motion_unit=family.first.motion_unit,
         )
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 
 from ...recordings import References
-from ._bivariate import BivariateForce
+from ._bivariate import Axis, BivariateForce
 from ._by_place import StribeckCurve, UnevenFriction
 from ._free_function import FREE
 from ._hidden_elements import Hysteresis, Relaxation, Resonator
@@ -340,6 +340,7 @@ def saved_classes() -> tuple[type, ...]:
         DriveRipple,
         *terms,
         *FREE.values(),
+        Axis,
         BivariateForce,
         *elements,
     )
