@@ -8,7 +8,7 @@ import pytest
 
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search._blocks import _usable, moved
-from jaxcam.discrepancy.search._free_search import FreeSearch
+from jaxcam.discrepancy.search._formulas import parts_lacking
 from jaxcam.discrepancy.search._gains import distinct_step, newton_step
 from jaxcam.discrepancy.search._left_out import LeftOut
 
@@ -41,15 +41,13 @@ def _found(functions, cost, samples=1000, score=None, names=frozenset()):
 def test_functions_that_explain_most_of_the_rest_are_kept(
     left, rest, needed, unchecked_types
 ):
-    search = object.__new__(FreeSearch)
-    search.policy = Policy()
-    search.fits = types.SimpleNamespace(policy=Policy())
+    fits: Any = types.SimpleNamespace(policy=Policy())
     fewer, whole = _found(["a"], left), _found(["a", "b"], rest)
-    assert search._lacks(fewer, fewer, whole) is needed
-    assert not search._lacks(whole, whole, whole)
+    assert parts_lacking(fits, fewer, fewer, whole) is needed
+    assert not parts_lacking(fits, whole, whole, whole)
     # a formula that consists of a term and a form does not replace another function
     both = _found(["a", "c"], left)
-    assert search._lacks(fewer, both, whole) is needed
+    assert parts_lacking(fits, fewer, both, whole) is needed
 
 
 def test_a_function_that_explains_much_is_not_fitted_without(

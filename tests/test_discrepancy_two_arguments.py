@@ -85,7 +85,7 @@ def test_the_force_is_constant_beyond_the_ends_of_a_range():
     term, _ = _force(_of_two(Variable.VELOCITY, Variable.POSITION))
     for inside, outside in (((0.4, 1.0), (0.9, 1.0)), ((0.2, -3.0), (0.2, -4.0))):
         one, other = (
-            float(term.acceleration(Motion(0.0, *map(jnp.asarray, at), jnp.zeros(()))))
+            float(term.acceleration(Motion(*(jnp.asarray(x) for x in (0.0, *at, 0.0)))))
             for at in (inside, outside)
         )
         # the direction of motion saturates to rounding
@@ -145,9 +145,7 @@ def test_a_function_keeps_its_values_over_the_ranges_of_other_recordings():
     """To 5 % of its size, over ranges a tenth narrower."""
     family = _of_two(Variable.VELOCITY, Variable.POSITION)
     _, used = _force(family)
-    one = Free(
-        family.first, Roughness(), ROOM_OF_TWO_ARGUMENTS, across=family.second
-    )
+    one = Free(family.first, Roughness(), ROOM_OF_TWO_ARGUMENTS, across=family.second)
     narrow = {
         f.name: dataclasses.replace(f, low=0.9 * f.low, high=0.9 * f.high)
         for f in family
@@ -161,6 +159,7 @@ def test_a_function_keeps_its_values_over_the_ranges_of_other_recordings():
         for x in np.meshgrid(np.linspace(-2.6, 1.7, 30), np.linspace(-0.25, 0.34, 30))
     )
     before = family.basis(along, across) @ used
+    assert isinstance(part.prior, Bivariate)
     after = part.prior.basis(along, across) @ numbers
     assert np.max(np.abs(after - before)) < 0.05 * np.max(np.abs(before))
 

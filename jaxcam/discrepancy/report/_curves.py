@@ -81,13 +81,16 @@ def degree_of(family: Family) -> int:
 def covariance_of(found: Fit, names: Sequence[str], policy: Policy):
     """Return the covariance of some parameters.
 
-    If the fit is poor, its own covariance may contain pieces whose
-    derivatives diverge; these are left out here.
+    If the fit is poor, its own covariance may contain pieces whose derivatives diverge;
+    these are left out here. The variance of a coefficient that only its prior
+    determines is infinite in a fit, and that of the prior here.
     """
     if found.cost < policy.near_cost * found.problem.samples:
         labels = [estimate.name for estimate in found.estimates]
         rows = [labels.index(name) for name in names]
-        return found.covariance[np.ix_(rows, rows)]
+        covariance = found.covariance[np.ix_(rows, rows)]
+        if np.all(np.isfinite(covariance)):
+            return covariance
     blocks = blocks_of(found.problem, found.point, names=found.free)
     information, _ = blocks.total()
     every, own = blocks.rows(found.free), blocks.rows(names)

@@ -253,3 +253,20 @@ def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
     return found.fit.cost < samples + max(
         surplus, fits.policy.negligible_residual * small
     )
+
+
+def parts_lacking(
+    fits: FreeFits, curve: Missing, found: Missing, whole: Missing
+) -> bool:
+    """Return whether functions or terms that the `curve` leaves out are needed, in
+    spite of the formulas `found`: only the `whole` fit leaves nothing but noise, or the
+    fit is poor and they explain most of what remains.
+    """
+    few, many = (len(one.functions) + len(one.names) for one in (curve, whole))
+    if few == many or leaves_noise(fits, found):
+        return False
+    if leaves_noise(fits, whole):
+        return True
+    samples, policy = found.problem.samples, fits.policy
+    left, rest = found.fit.cost - samples, whole.fit.cost - samples
+    return heat_of(found.fit) > policy.near_cost and rest < policy.explains * left

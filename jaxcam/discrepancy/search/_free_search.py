@@ -17,12 +17,12 @@ from ..terms import Family, own_faults, spelled, Term
 from ._additions import Additions
 from ._clock import Clock
 from ._element_need import ElementNeed
-from ._formulas import formulated, leaves_noise
+from ._formulas import formulated, leaves_noise, parts_lacking
 from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of
 from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
-from ._leads import Lead, Leads
+from ._leads import Lead, Leads, others, tie
 from ._left_out import LeftOut
 from ._recentre import recentred
 from ._rooms import Rooms
@@ -132,7 +132,8 @@ class FreeSearch:
         """
         assert self.first
         least = self.first[0].gain + self._least()
-        small = self.policy.small * max(self.cost - found.fit.cost, 0.0)
+        # disconnected pieces do not show how much will be explained
+        small = self._small(found) if found.functions else self.policy.small * self.cost
         trials = self.of_two.tried(bare, found, least, small)
         self.tried += trials
         trials.sort(key=lambda trial: trial.score)
@@ -163,7 +164,7 @@ class FreeSearch:
         problem = self.rooms.of(found).whole
         found = simplified(self.fits, problem, found, self.progress)
         curve, found = found, self._formulated(found)
-        if self._lacks(curve, found, whole):
+        if parts_lacking(self.fits, curve, found, whole):
             # forms do not make up for the parts left out: start from the complete fit
             curve, found = whole, self._formulated(whole)
         if len(curve.functions) > 1 or curve.names:
@@ -173,11 +174,11 @@ class FreeSearch:
         # a form may score slightly worse than the function that it replaces
         best = min(curve.score, found.score)
         chosen = next(one.label for one in curve.functions)
-        for lead in self._others():
+        for lead in others(self.first or (), self.alone, self.tried, self.policy):
             if self.clock.over:
                 break
             noise = leaves_noise(self.fits, found, self._small(found))
-            if noise and not self._ties(lead.label, chosen):
+            if noise and not tie(self.alone, lead.label, chosen, self.policy):
                 continue
             curve = self._rival_function(bare, lead)
             if curve is None:
@@ -188,20 +189,6 @@ class FreeSearch:
                 found, best = other, score
         return found
 
-    def _lacks(self, curve: Missing, found: Missing, whole: Missing) -> bool:
-        """Return whether functions or terms that the `curve` leaves out are needed, in
-        spite of the formulas `found`: only the `whole` fit leaves nothing but noise, or
-        the fit is poor and they explain most of what remains.
-        """
-        few, many = (len(one.functions) + len(one.names) for one in (curve, whole))
-        if few == many or leaves_noise(self.fits, found):
-            return False
-        if leaves_noise(self.fits, whole):
-            return True
-        samples, policy = found.problem.samples, self.policy
-        left, rest = found.fit.cost - samples, whole.fit.cost - samples
-        return heat_of(found.fit) > policy.near_cost and rest < policy.explains * left
-
     def _formulated(self, found: Missing) -> Missing:
         self.tried.append(found)
         if id(found) not in self.formulas:
@@ -211,30 +198,6 @@ class FreeSearch:
         _, best, forms = self.formulas[id(found)]
         self.tried += forms
         return best
-
-    def _others(self) -> list[Lead]:
-        """Return the candidates for the first function that were not fitted to whole
-        recordings, except those that single pieces of flight rule out.
-        """
-        fitted = {one.label for trial in self.tried for one in trial.functions}
-        costs = {label: one.fit.cost for label, one in self.alone.items()}
-        most = self.policy.hopeless_cost * min(costs.values(), default=math.inf)
-        return [
-            lead
-            for lead in self.first or []
-            if lead.family is not None
-            and lead.label not in fitted
-            and costs.get(lead.label, 0.0) <= most
-        ]
-
-    def _ties(self, label: str, chosen: str) -> bool:
-        """Return whether single pieces of flight do not clearly prefer the chosen
-        function to another one.
-        """
-        if label not in self.alone or chosen not in self.alone:
-            return False
-        one, other = self.alone[label], self.alone[chosen]
-        return one.score < other.score + self.policy.tie * heat_of(other.fit)
 
     def _rival_function(self, bare: Missing, lead: Lead) -> Missing | None:
         """Return the fit with another function alone, or `None` if it fails.

@@ -1,7 +1,7 @@
 """Rank additions to a fit: functions, terms, and forces with an internal state."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -215,6 +215,40 @@ def _heated(problem: Problem, found: Missing) -> Problem:
     increased if the fit is poor.
     """
     return heated(filled(problem, found.functions), heat_of(found.fit))
+
+
+def others(
+    leads: Sequence[Lead],
+    alone: Mapping[str, Missing],
+    tried: Sequence[Missing],
+    policy: Policy,
+) -> list[Lead]:
+    """Return the candidates for the first function that were not fitted to whole
+    recordings, except those that single pieces of flight rule out.
+
+    **Arguments:** all candidates; the fits of single pieces with one of them, by its
+    label; the fits of whole recordings; and the policy.
+    """
+    fitted = {one.label for trial in tried for one in trial.functions}
+    costs = {label: one.fit.cost for label, one in alone.items()}
+    most = policy.hopeless_cost * min(costs.values(), default=math.inf)
+    return [
+        lead
+        for lead in leads
+        if lead.family is not None
+        and lead.label not in fitted
+        and costs.get(lead.label, 0.0) <= most
+    ]
+
+
+def tie(alone: Mapping[str, Missing], label: str, chosen: str, policy: Policy) -> bool:
+    """Return whether single pieces of flight do not clearly prefer the chosen function
+    to another one.
+    """
+    if label not in alone or chosen not in alone:
+        return False
+    one, other = alone[label], alone[chosen]
+    return one.score < other.score + policy.tie * heat_of(other.fit)
 
 
 def decoys_of(leads: Sequence[Lead], found: Missing) -> tuple[tuple[str, float], ...]:
