@@ -192,7 +192,7 @@ def late_spring():
         Family(Where.FLIGHT, Variable.VELOCITY, -4.0, 4.0, slip=0.01),
     )
     rooms = Rooms(problem, families, False, False)
-    fits = FreeFits([one.name for one in PARAMETERS], (), Policy())
+    fits = FreeFits([one.name for one in PARAMETERS], (), Policy(followed=1))
     search = TwoArguments(fits, families, rooms, lambda *said: None, Clock(10.0))
     bare = fits.fitted(
         Subset(rooms.plain.apart, (), frozenset()), rooms.plain.apart.start, 20

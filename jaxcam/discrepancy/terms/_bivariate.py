@@ -17,9 +17,10 @@ from ._free_function import pick_of, picked
 from ._term import Motion
 
 
-# Number of sines of an argument, and of harmonics of a phase with their constant; one
-# more coefficient represents a jump
-_SINES, _HARMONICS = 10, 9
+# Number of sines of an argument, and of pairs of harmonics of a phase, which also has a
+# constant; one more coefficient represents a jump
+_SINES, _PAIRS = 10, 4
+_HARMONICS = 1 + 2 * _PAIRS
 _MOST = _SINES + 1
 
 
@@ -71,10 +72,12 @@ class Bivariate(NamedTuple):
 
 
 class Axis(eqx.Module):
-    """One of the arguments: the sines of which a function consists, and its range."""
+    """One of the arguments: the angle whose multiples the functions depend on is
+    `rate * argument + shift`, within the range of the argument.
+    """
 
-    rates: Float[Array, " k"]
-    shifts: Float[Array, " k"]
+    rate: Float[Array, ""]
+    shift: Float[Array, ""]
     low: Float[Array, ""]
     high: Float[Array, ""]
     picks: Float[Array, " a"]
@@ -84,11 +87,12 @@ class Axis(eqx.Module):
 
     @classmethod
     def of(cls, family: Family):
-        waves = family.waves(_sines(family))
-        rates, shifts = (jnp.pad(one, (0, _SINES - len(one))) for one in waves)
+        # the first sine of a phase is a constant
+        first = 1 if family.periodic else 0
+        rates, shifts = family.waves(_sines(family))
         return cls(
-            rates,
-            shifts,
+            rates[first],
+            jnp.zeros(()) if family.periodic else shifts[first],
             jnp.asarray(family.low),
             jnp.asarray(family.high),
             pick_of(family),
@@ -102,11 +106,20 @@ class Axis(eqx.Module):
 
     def functions(self, at) -> Float[Array, " k"]:
         """Return the functions of the argument, the jump last."""
-        width = self.high - self.low
-        inside = jnp.clip(at, self.low, self.high)
-        inside = jnp.where(self.periodic, self.low + (at - self.low) % width, inside)
-        jump = self.jumping * jnp.tanh(at / self.slip)
-        return jnp.append(jnp.sin(self.rates * inside + self.shifts), jump)
+        inside = jnp.where(self.periodic, at, jnp.clip(at, self.low, self.high))
+        angle = self.rate * inside + self.shift
+        # multiples of the angle by recurrence, because many sines compile slowly
+        twice = 2 * jnp.cos(angle)
+        sines = [jnp.zeros_like(angle), jnp.sin(angle)]
+        cosines = [jnp.ones_like(angle), twice / 2]
+        for _ in range(_SINES - 1):
+            sines.append(twice * sines[-1] - sines[-2])
+        for _ in range(_PAIRS - 1):
+            cosines.append(twice * cosines[-1] - cosines[-2])
+        of_phase = [*cosines, *sines[1 : _PAIRS + 1]]
+        of_phase += [jnp.zeros_like(angle)] * (_SINES - _HARMONICS)
+        chosen = jnp.where(self.periodic, jnp.stack(of_phase), jnp.stack(sines[1:]))
+        return jnp.append(chosen, self.jumping * jnp.tanh(at / self.slip))
 
 
 class BivariateForce(FittedFunction):
