@@ -24,7 +24,7 @@ from jaxcam.discrepancy.search import (
 )
 from jaxcam.discrepancy.search._converged import stuck
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
-from jaxcam.discrepancy.search._free_search import FreeSearch
+from jaxcam.discrepancy.search._leads import tie
 from jaxcam.discrepancy.terms import (
     Factor,
     families,
@@ -381,9 +381,8 @@ def test_a_function_that_single_pieces_do_not_exclude_ties(
         return SimpleNamespace(score=score, fit=fit)
 
     fits = {"sensor": alone(1000.0), "surface": alone(score)}
-    search = SimpleNamespace(policy=Policy(), alone=fits)
-    assert FreeSearch._ties(search, "surface", "sensor") == ties  # pyright: ignore
-    assert not FreeSearch._ties(search, "force", "sensor")  # pyright: ignore
+    assert tie(fits, "surface", "sensor", Policy()) == ties  # pyright: ignore
+    assert not tie(fits, "force", "sensor", Policy())  # pyright: ignore
 
 
 def test_an_edge_between_two_impacts_is_sharp_in_a_fit():

@@ -62,7 +62,10 @@ def _only_form(missing: Missing, other: Missing) -> tuple[Free | None, Free | No
     ((one, form),) = pairs
     if isinstance(one, Hidden) or isinstance(form, Hidden):
         return nothing
-    same = one.label == form.label and one.smooth and not form.smooth
+    alike = one.label == form.label
+    if one.across is not None:
+        alike = set(one.arguments) == set(form.arguments)
+    same = alike and one.smooth and not form.smooth
     return (one, form) if same else nothing
 
 

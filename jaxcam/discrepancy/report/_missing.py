@@ -186,14 +186,16 @@ def _one(
     if isinstance(one.prior, Bivariate):
         points, unit = policy.shape_points // 2, _unit(family)
         table = bivariate_table(one.prior, numbers, covariance, points, unit)
+        nearly, words = _with_close(table.words, close)
         return MissingFunction(
             kind,
             one.arguments,
             *table[:3],
             unit,
-            table.words,
+            words,
             found.problem.records,
             numbers=tuple(one.coefficients),
+            nearly=nearly,
         )
     if one.gate is not None:
         points = policy.shape_points // 2
@@ -226,10 +228,7 @@ def _one(
             error = level
     else:
         formula, words = formula_of(family, one.primitive, numbers, kind)
-    nearly = None
-    if close is not None:
-        nearly, said = _formula(close.fit, close.form)
-        words = f"{words}; to within {close.percent:.2g} %, it is {said}"
+    nearly, words = _with_close(words, close)
     if kind == "restitution":
         value, error = np.exp(value), np.exp(value) * error
     grid: tuple[np.ndarray, ...] = (along,)
@@ -258,6 +257,14 @@ def _one(
         gap=gap,
         nearly=nearly,
     )
+
+
+def _with_close(words: str, close: CloseForm | None) -> tuple[str | None, str]:
+    """Return the formula of a close form, and the words with it."""
+    if close is None:
+        return None, words
+    nearly, said = _formula(close.fit, close.form)
+    return nearly, f"{words}; to within {close.percent:.2g} %, it is {said}"
 
 
 def _formula(found: Fit, form: Free) -> tuple[str, str]:

@@ -14,14 +14,20 @@ from jaxtyping import Array, Float
 
 from ...fitting import Parameter, Problem
 from ..policy import Policy
-from ..terms import Bivariate, Factor, Family, Motion, Term, Variable, Where
+from ..terms import (
+    Bivariate,
+    BivariateForce,
+    Factor,
+    Family,
+    Motion,
+    Term,
+    Variable,
+    Where,
+)
 from ._local_force import blocks_at_nodes, forces_at_nodes, Response
 from ._roughness import beside, Roughness, roughness
 
 
-# Number of forces whose likelihood is computed at once, so that all functions share one
-# compiled program
-_WIDTH = 121
 # Arguments that may be combined
 _COMBINED = (
     (Variable.VELOCITY, Variable.POSITION),
@@ -130,7 +136,8 @@ def likelihood_of(
     """
     forces = bivariate_at_nodes(nodes, family)
     used = forces.shape[-1]
-    padding = [(0, 0)] * 3 + [(0, _WIDTH - used)]
+    # all functions share one compiled program
+    padding = [(0, 0)] * 3 + [(0, BivariateForce.size - used)]
     information, score, free, own = nodes.quadratic(np.pad(forces, padding))
     quadratic = information, score, free, own[:used]
     rough = roughness(*quadratic, family, np.zeros(used), policy)

@@ -87,7 +87,7 @@ def _for_search(search: FreeSearch, one: Missing) -> tuple[Subset, Point] | None
     `None` if it has no place for them.
     """
     families = {f.name: f for f in search.families}
-    problem = search.rooms.of(one).whole
+    problem = search.rooms.for_functions(one.functions).whole
     labels = {getattr(term, "label", "") for term in terms_of(problem.model)}
     point = starting_at(one.fit, problem)
     values, functions = np.array(point.values), []
@@ -120,7 +120,9 @@ def _over_range(
         return across and _bivariate_over_range(one, numbers, family, across)
     if one.primitive is None:
         along = np.linspace(family.low, family.high, _GRID)
-        old, new = (free_basis(f, along, len(numbers)) for f in (one.family, family))
+        before = np.clip(along, one.family.low, one.family.high)
+        old = free_basis(one.family, before, len(numbers))
+        new = free_basis(family, along, len(numbers))
         numbers = np.linalg.lstsq(new, old @ numbers, rcond=1e-6)[0]
         return dataclasses.replace(one, family=family), numbers
     count, gate = one.primitive.count, one.gate
@@ -142,10 +144,12 @@ def _bivariate_over_range(
     """Return a function of two arguments with the ranges of other recordings."""
     assert one.across is not None
     moved = dataclasses.replace(one, family=family, across=across)
-    ranges = Bivariate(one.family, one.across), Bivariate(family, across)
+    earlier, other = Bivariate(one.family, one.across), Bivariate(family, across)
     grid = [np.linspace(f.low, f.high, _SIDE) for f in (family, across)]
     pairs = [at.ravel() for at in np.meshgrid(*grid)]
-    old, new = (each.basis(*pairs) for each in ranges)
+    # beyond its ends, a function is constant
+    inside = [np.clip(at, f.low, f.high) for f, at in zip(earlier, pairs)]
+    old, new = earlier.basis(*inside), other.basis(*pairs)
     return moved, np.linalg.lstsq(new, old @ numbers, rcond=1e-6)[0]
 
 

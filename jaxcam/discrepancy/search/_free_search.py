@@ -105,11 +105,10 @@ class FreeSearch:
         if trials and self._suffices(trials[0]):
             return trials[0]
         found = None if self.need.preferred else self._functions(bare)
-        if found is None or not self.first:
-            return found
-        if not trials:
+        if found is not None and self.first and not trials:
             trials = self._of_two(bare, found)
-        return min((found, *trials), key=lambda trial: trial.score)
+        every = trials if found is None else [found, *trials]
+        return min(every, key=lambda trial: trial.score, default=None)
 
     def _of_two_first(self, bare: Missing) -> list[Missing]:
         """Return fits with forces of two arguments, the best first, if they promise
@@ -138,7 +137,8 @@ class FreeSearch:
         self.tried += trials
         trials.sort(key=lambda trial: trial.score)
         if trials and not self._suffices(trials[0]) and not self.clock.over:
-            trials.insert(0, self._pruned(self._grown(trials[0], False)))
+            more = self._pruned(self._grown(trials[0], False))
+            trials = [more, *trials] if more.functions else trials
         return trials
 
     def _suffices(self, found: Missing) -> bool:
@@ -227,7 +227,8 @@ class FreeSearch:
         least = self._least()
         if found is not None:
             least = max(least, self._small(found) / heat_of(found.fit))
-        return self.need.remains(self.problem, found, least)
+        problem = self.problem if found is None else self.rooms.of(found).whole
+        return self.need.remains(problem, found, least)
 
     def falls_short(self, found: Missing | None, tolerated: bool = True) -> bool:
         """Return whether nothing was found, or a residual above the noise is left.
@@ -268,7 +269,7 @@ class FreeSearch:
                 trial = self.additions.fitted(found, lead, apart, found.score)
                 if trial is not None and not apart:
                     self.tried.append(trial)
-                elif trial is not None and leads is self.first:
+                elif trial is not None and not (found.functions or found.names):
                     self.alone[lead.label] = trial
                 if trial is not None and trial.score < best.score:
                     best = trial
@@ -289,9 +290,7 @@ class FreeSearch:
         leads = self._leads(problem, found, apart)
         if self.first is None:
             self.first = leads
-            gains = [lead.gain for lead in leads]
-            if apart:
-                gains.append(self.of_two.promised(found))
+            gains = [*(lead.gain for lead in leads), self.of_two.promised(found)]
             if not self.roughly:
                 self.need.compare(problem, found, gains, self._least())
         return leads

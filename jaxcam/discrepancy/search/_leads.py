@@ -133,10 +133,12 @@ class Leads:
             yield self._against_decoy(problem, found, lead, response) if first else lead
 
     def _has_room(self, found: Missing) -> bool:
-        """Return whether a force with an internal state can be added."""
+        """Return whether a force with an internal state can be added: no problem has
+        room for two of them, or for one and a force of two arguments.
+        """
         slots = {one.slot for one in found.functions}
-        one = any(isinstance(f, Hidden) for f in found.functions)
-        return len(slots) < self.policy.functions and not one
+        full = any(isinstance(f, Hidden) or f.across for f in found.functions)
+        return len(slots) < self.policy.functions and not full
 
     def _force(
         self,
@@ -224,12 +226,14 @@ def others(
     policy: Policy,
 ) -> list[Lead]:
     """Return the candidates for the first function that were not fitted to whole
-    recordings, except those that single pieces of flight rule out.
+    recordings, except those that single pieces of flight rule out. Additions to a force
+    of two arguments do not count.
 
     **Arguments:** all candidates; the fits of single pieces with one of them, by its
     label; the fits of whole recordings; and the policy.
     """
-    fitted = {one.label for trial in tried for one in trial.functions}
+    of_one = (trial for trial in tried if not _of_two(trial))
+    fitted = {one.label for trial in of_one for one in trial.functions}
     costs = {label: one.fit.cost for label, one in alone.items()}
     most = policy.hopeless_cost * min(costs.values(), default=math.inf)
     return [
@@ -239,6 +243,10 @@ def others(
         and lead.label not in fitted
         and costs.get(lead.label, 0.0) <= most
     ]
+
+
+def _of_two(found: Missing) -> bool:
+    return any(isinstance(one, Free) and one.across for one in found.functions)
 
 
 def tie(alone: Mapping[str, Missing], label: str, chosen: str, policy: Policy) -> bool:

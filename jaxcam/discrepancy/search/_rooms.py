@@ -11,7 +11,7 @@ from ..terms import Bivariate, Family, Where
 from ._bivariate_likelihood import bivariate_forces
 from ._free_fits import Missing
 from ._hidden_signals import Driven, driven_by
-from ._slots import ROOM_OF_TWO_ARGUMENTS, roomy
+from ._slots import Part, ROOM_OF_TWO_ARGUMENTS, roomy
 
 
 class Room(NamedTuple):
@@ -67,7 +67,16 @@ class Rooms:
 
     def of(self, found: Missing) -> Room:
         """Return the problems that have the parameters of a fit."""
-        if ROOM_OF_TWO_ARGUMENTS in {one.slot for one in found.functions}:
-            return self.with_two_arguments
-        plain = found.problem.names == self.plain.whole.names
-        return self.plain if plain else self.with_element
+        made = vars(self)
+        rooms = (made.get(name) for name in ("plain", "with_two_arguments"))
+        for room in rooms:
+            if room is not None and room.whole.names == found.problem.names:
+                return room
+        return self.with_element
+
+    def for_functions(self, functions: Sequence[Part]) -> Room:
+        """Return the problems without room for an element that have slots for the
+        functions of a fit to other recordings.
+        """
+        of_two = ROOM_OF_TWO_ARGUMENTS in {one.slot for one in functions}
+        return self.with_two_arguments if of_two else self.plain

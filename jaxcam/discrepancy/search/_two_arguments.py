@@ -1,7 +1,9 @@
 """Try forces that depend on two arguments: products of two forms, and free functions.
 
-They are tried only if the functions of one argument leave something to explain, and if
-a free function of two arguments promises more than the best function of one.
+They are tried first if a free function of two arguments promises more than functions of
+one argument and their sums. Otherwise they are tried if functions of one argument leave
+something to explain, and if a free function of two arguments promises more than the
+best function of one.
 """
 
 import math
@@ -52,7 +54,7 @@ class _Promised(NamedTuple):
 
 
 class TwoArguments:
-    """Fits of forces of two arguments in place of the functions that were found.
+    """Fits of forces of two arguments.
 
     **Arguments:** the fits of subsets, families of functions of one argument, the
     problems with room for the functions, `progress(sentence, fraction)`, and the clock.
@@ -80,7 +82,8 @@ class TwoArguments:
 
     def promise_more(self, bare: Missing, leads: Sequence[Lead], least: float) -> bool:
         """Return whether a free function of two arguments promises more than any
-        function of one argument, and than sums of two such functions.
+        candidate of one argument, and than sums of two functions. Compared are the sums
+        with one of the candidates, and those of functions of the same two arguments.
 
         **Arguments:** the fit without functions; the candidates of one argument, the
         best first; and the gain by which it must exceed them.
@@ -90,18 +93,17 @@ class TwoArguments:
             return False
         nodes = self._promising(bare).nodes
         at_nodes = {
-            one.name: forces_at_nodes(nodes.response, [free_term(one, "new")])
+            one: _of_unit_size(forces_at_nodes(nodes.response, [free_term(one, "new")]))
             for one in self.forces
         }
-        most = 0.0
-        for one in [lead.family for lead in leads if lead.family in self.forces]:
-            for other in self.forces:
-                if one is not None and one != other:
-                    both = np.concatenate(
-                        [at_nodes[one.name], at_nodes[other.name]], axis=-1
-                    )
-                    most = max(most, self._gain(nodes, both, Sum(one, other)))
-        return promised > most + least
+        first = [lead.family for lead in leads if lead.family in at_nodes]
+        sums = [{one, other} for one in first for other in at_nodes if one != other]
+        # each sum once
+        for pair in {frozenset(one) for one in (*sums, *map(set, self.families))}:
+            both = np.concatenate([at_nodes[one] for one in pair], axis=-1)
+            if self._gain(nodes, both, Sum(*pair)) > promised - least:
+                return False
+        return True
 
     def tried(
         self, bare: Missing, found: Missing, least: float, small: float
@@ -129,7 +131,8 @@ class TwoArguments:
             gain = likelihood.rough.gain
             close = gain > self.policy.rivalling * likelihoods[0].rough.gain
             promised = bare.fit.cost - heat_of(bare.fit) * gain
-            if leaves_noise(self.fits, best, small) or self.clock.over:
+            noise = best.functions and leaves_noise(self.fits, best, small)
+            if noise or self.clock.over:
                 break
             if not close or promised > best.fit.cost:
                 break
@@ -146,8 +149,8 @@ class TwoArguments:
             self.progress(
                 "searching the residuals for functions of two arguments", None
             )
-            heat, apart = heat_of(bare.fit), self.rooms.plain.apart
-            problem = heated(filled(apart, bare.functions), heat)
+            heat = heat_of(bare.fit)
+            problem = heated(filled(bare.problem, bare.functions), heat)
             response = force_response(problem, bare.fit.point, self.fits.free(bare))
             nodes = Nodes.of(problem, response, heat)
             every = [likelihood_of(nodes, one, self.policy) for one in self.families]
@@ -194,7 +197,7 @@ class TwoArguments:
             point, functions = trial.fit.point, trial.functions
             if not trial.fit.cost < beaten:
                 return None
-            # what explains single pieces is worth the iterations that joints need
+            # a force that explains single pieces may take many steps to connect them
             most = math.inf
         assert trial is not None
         return trial if math.isfinite(trial.score) else None
@@ -233,3 +236,10 @@ class TwoArguments:
             one.roughness._replace(gain=gain),
         )
         return likelihood, occam_of(inside, one.spread)
+
+
+def _of_unit_size(forces: Float[np.ndarray, "r k l p"]) -> np.ndarray:
+    """Return forces scaled to a common size, so that a sum of two has a prior that does
+    not depend on their units.
+    """
+    return forces / max(float(np.sqrt(np.mean(forces**2))), np.finfo(float).tiny)

@@ -130,6 +130,7 @@ class BivariateForce(FittedFunction):
     """
 
     name: ClassVar[str] = "bivariate_force"
+    size: ClassVar[int] = _MOST**2
     label: str = eqx.field(static=True)
     coefficients: tuple[Array, ...] = eqx.field(
         converter=lambda values: tuple(jnp.asarray(x, dtype=float) for x in values)
@@ -142,7 +143,7 @@ class BivariateForce(FittedFunction):
         """Return a function with given coefficients, zero by default."""
         return cls(
             label=label,
-            coefficients=[0.0] * _MOST**2 if coefficients is None else coefficients,
+            coefficients=[0.0] * cls.size if coefficients is None else coefficients,
             first=Axis.of(family.first),
             second=Axis.of(family.second),
             motion_unit=family.first.motion_unit,
