@@ -123,7 +123,7 @@ class TwoArguments:
         likelihoods = [one for one in likelihoods if one.rough.gain > least]
         starts = self._products_of(nodes, likelihoods)
         beaten = self.policy.form_cost * found.fit.cost
-        # a free function is fitted with fewer iterations than a product of wrong forms
+        # with wrong forms, a product takes many iterations; a free function takes few
         likely = [one for one in starts if one.gain > likelihoods[0].rough.gain]
         trials = self.products.tried(likely, bare.fit.point, beaten)
         for likelihood in likelihoods:
