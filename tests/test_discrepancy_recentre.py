@@ -6,13 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from swing_rig import PARAMETERS, Swing
+from swing_rig import PARAMETERS, swinging
 
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search import _recentre
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
-from jaxcam.discrepancy.search._of_base import within
 from jaxcam.discrepancy.search._recentre import _moved, recentred
 from jaxcam.discrepancy.search._roughness import Roughness
 from jaxcam.discrepancy.search._slots import Free, roomy
@@ -22,10 +20,7 @@ from jaxcam.discrepancy.terms import (
     free_basis,
     Variable,
     Where,
-    WithTerms,
 )
-from jaxcam.fitting import Model, Problem, Sensor
-from jaxcam.recordings import Recording, segment
 
 
 FAMILY = Family(Where.FLIGHT, Variable.PHASE, 0.0, 2 * math.pi, middle=0.4)
@@ -72,25 +67,14 @@ def test_the_centre_of_a_stiffness_alone_follows_from_the_residual():
     """A stiffness 6 (v/v0)^2 about 0.05 rad, fitted about -0.04 rad: the centre to
     0.002 rad, the cost to that of noise."""
     noise, centre, fastest = 1e-4, 0.05, 2.5
-    time = 1e-3 * np.arange(1200)
     family = Family(
         Where.FLIGHT, Variable.VELOCITY, -3.5, 3.5, Factor.DEFLECTION, middle=-0.04
     )
-    rng, recordings = np.random.default_rng(3), []
 
-    def rate(t, x):
-        own = 6.0 * (x[1] / fastest) ** 2
-        return x[1], -149.0 * x[0] - 0.1 * x[1] - own * (x[0] - centre)
+    def force(x, v):
+        return -6.0 * (v / fastest) ** 2 * (x - centre)
 
-    for number, start in enumerate((0.2, 0.25)):
-        flown = solve_ivp(
-            rate, (0.0, 1.2), (start, 0.0), "DOP853", time, rtol=1e-10, atol=1e-12
-        )
-        seen = flown.y[0] + noise * rng.normal(size=len(time))
-        run = Recording(f"run{number}", time, {"angle_rad": seen})
-        recordings.append(segment(run, "angle_rad", noise=noise))
-    model = Model(WithTerms(Swing()), {"angle_rad": Sensor(0, noise=noise)})
-    problem = Problem.build(model, recordings, [within(one) for one in PARAMETERS])
+    problem = swinging(force, (0.2, 0.25), 1.2, noise)
     room = roomy(problem, family, (), None)
     names = [one.name for one in PARAMETERS]
     fits = FreeFits(names, (), Policy())

@@ -9,8 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from swing_rig import PARAMETERS, Swing
+from swing_rig import PARAMETERS, swinging
 
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
@@ -20,7 +19,6 @@ from jaxcam.discrepancy.search._earlier import _over_range
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
 from jaxcam.discrepancy.search._free_search import FreeSearch
 from jaxcam.discrepancy.search._leads import Leads
-from jaxcam.discrepancy.search._of_base import within
 from jaxcam.discrepancy.search._rooms import Rooms
 from jaxcam.discrepancy.search._roughness import Roughness
 from jaxcam.discrepancy.search._shuffled import shuffled
@@ -36,9 +34,7 @@ from jaxcam.discrepancy.terms import (
     Where,
     WithTerms,
 )
-from jaxcam.fitting import Model, Problem, Sensor
 from jaxcam.models import ImpactOscillator, load_system, save_system
-from jaxcam.recordings import Recording, segment
 
 
 RANGES = {
@@ -187,21 +183,7 @@ def test_a_function_keeps_its_values_over_the_ranges_of_other_recordings(width):
 def _swings(force, noise=1e-4):
     """Recordings of a swing with an additional force, and a search for forces of two
     arguments that has fitted the rig alone to disconnected pieces."""
-    time = 1e-3 * np.arange(800)
-
-    def rate(t, x):
-        return x[1], -149.0 * x[0] - 0.1 * x[1] + force(*x)
-
-    rng, recordings = np.random.default_rng(3), []
-    for number, start in enumerate((0.15, 0.22, 0.3)):
-        flown = solve_ivp(
-            rate, (0.0, 0.8), (start, 0.0), "DOP853", time, rtol=1e-10, atol=1e-12
-        )
-        seen = flown.y[0] + noise * rng.normal(size=len(time))
-        run = Recording(f"run{number}", time, {"angle_rad": seen})
-        recordings.append(segment(run, "angle_rad", noise=noise))
-    model = Model(WithTerms(Swing()), {"angle_rad": Sensor(0, noise=noise)})
-    problem = Problem.build(model, recordings, [within(one) for one in PARAMETERS])
+    problem = swinging(force, (0.15, 0.22, 0.3), 0.8, noise)
     families = (
         Family(Where.FLIGHT, Variable.POSITION, -0.3, 0.3),
         Family(Where.FLIGHT, Variable.VELOCITY, -4.0, 4.0, slip=0.01),

@@ -10,13 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ..terms import Bivariate, BivariateForce, Family, unit_along
-from ._curves import degree_of, errors_of
+from ._curves import degree_of, determined, errors_of
 from ._words import quantity
-
-
-# Ratio of the errors with and without the part that rig parameters can represent above
-# which that part is not determined
-_UNDETERMINED = 3.0
 
 
 class BivariateTable(NamedTuple):
@@ -53,8 +48,7 @@ def bivariate_table(
     rest = basis - by_rig @ (fitted @ basis)
     level, error = rest @ numbers, errors_of(rest, covariance)
     words = _words(family, pairs, level, error, unit)
-    if np.median(stderr) > _UNDETERMINED * np.median(error):
-        stderr = error
+    stderr = determined(stderr, error)
     shape = points, points
     return BivariateTable(grid, value.reshape(shape), stderr.reshape(shape), words)
 

@@ -14,6 +14,9 @@ from ..search import blocks_of, Free, free_term
 from ..terms import Family, FreeFunction, Variable
 
 
+# Ratio of the errors with and without the part that rig parameters can represent above
+# which that part is not determined
+_UNDETERMINED = 3.0
 # Points at which a function is evaluated, for each point of its table
 _FINER = 20
 
@@ -63,6 +66,14 @@ def graded(even: np.ndarray, function) -> np.ndarray:
 def errors_of(basis, covariance):
     """Return the standard errors of linear combinations (rows) of coefficients."""
     return np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", basis, covariance, basis), 0.0))
+
+
+def determined(error: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return the standard errors of a function, or those of the rest of it if the part
+    that rig parameters can represent is not determined.
+    """
+    large = np.median(error) > _UNDETERMINED * np.median(rest)
+    return rest if large else error
 
 
 def level_of(family: Family, along, values):

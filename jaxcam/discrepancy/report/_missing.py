@@ -32,6 +32,7 @@ from ._curves import (
     covariance_of,
     curve,
     degree_of,
+    determined,
     errors_of,
     graded,
     level_of,
@@ -49,9 +50,6 @@ _KINDS = {
     Where.CONTACT: "surface",
     Where.SENSOR: "sensor",
 }
-# Ratio of the errors with and without a straight line above which the line is not
-# determined
-_UNDETERMINED = 3.0
 _VERBS = {
     "force": "a force",
     "restitution": "a coefficient of restitution",
@@ -224,8 +222,7 @@ def _one(
     if one.primitive is None:
         level = errors_of(level_of(family, along, basis), covariance)
         words, formula = _words(family, kind, along, value, level), None
-        if np.median(error) > _UNDETERMINED * np.median(level):
-            error = level
+        error = determined(error, level)
     else:
         formula, words = formula_of(family, one.primitive, numbers, kind)
     nearly, words = _with_close(words, close)

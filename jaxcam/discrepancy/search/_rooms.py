@@ -67,6 +67,7 @@ class Rooms:
 
     def of(self, found: Missing) -> Room:
         """Return the problems that have the parameters of a fit."""
+        # a room that was not built yet contains no fit
         made = vars(self)
         rooms = (made.get(name) for name in ("plain", "with_two_arguments"))
         for room in rooms:
