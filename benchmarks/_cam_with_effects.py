@@ -17,9 +17,9 @@ from benchmarks._numba_rig import _acceleration, _drive, _ROUNDING, _surface
 from jaxcam.data.make_demo import RealRig
 
 
-_KINDS = ("force", "resonance", "restitution", "surface", "sensor")
-_FORCE, _RESONANCE, _RESTITUTION, _SURFACE = range(4)
-_NOTHING = Effect("sensor", (), lambda u, w, phi, t, s: 0.0, (0.0, 0.0))
+_KINDS = ("force", "resonance", "restitution", "surface")
+_FORCE, _RESONANCE, _RESTITUTION, _SURFACE = range(len(_KINDS))
+_NOTHING = Effect("", (), lambda u, w, phi, t, s: 0.0, (0.0, 0.0))
 # Step of the differences that give the rates of a moving surface (s)
 _SMALL = 1e-4
 
@@ -28,33 +28,34 @@ class _Rig(NamedTuple):
     """What a run depends on, apart from the effect's own functions.
 
     - `harmonics` of the contact angle; `numbers` as in `_numba_rig`.
-    - `kind` of the effect, a place in `_KINDS`, and the `scales` `(middle, reach,
-        velocity, duration, hertz, size)` of its arguments and its value.
+    - `scales`: for each of `_KINDS`, a row `(middle, reach, velocity, duration, hertz,
+        size)` for the arguments of the effect and its value; `remembers`: the kind of
+        the effect with states of its own.
     - `speed` of the drive (rad/s), and the time `clock` (s) at which the record begins.
     """
 
     harmonics: np.ndarray
     numbers: np.ndarray
-    kind: int
     scales: np.ndarray
+    remembers: int
     speed: float
     clock: float
 
 
 def run(
     rig: RealRig,
-    hidden: Hidden | None,
+    hidden: dict[str, Hidden],
     speed: float,
     duration: float,
     settle: float,
     interval: float = 5e-4,
 ):
-    """The last `duration` (s) of a run at `speed` (rad/s).
+    """The last `duration` (s) of a run at `speed` (rad/s), with effects by their kind.
 
     **Returns:** a row `(cam rotation, angle, velocity)` for each sample, and a row
     `(time, approach speed, cam rotation)` for each impact.
     """
-    effect = _NOTHING if hidden is None else hidden.effect
+    effects = tuple(hidden[k].effect if k in hidden else _NOTHING for k in _KINDS)
     numbers = np.zeros(21)
     numbers[:7] = (
         rig.stiffness_over_inertia,
@@ -65,24 +66,42 @@ def run(
         rig.damping,
         rig.wander,
     )
-    scales = np.ones(6)
-    if hidden is not None:
-        s = hidden.scales
-        scales[:] = s.middle, s.reach, s.velocity, s.lasts, s.hertz, hidden.unit
-    kind, clock = _KINDS.index(effect.kind), interval * round(settle / interval)
-    whole = _Rig(rig.profile(), numbers, kind, scales, speed, clock)
+    scales = np.ones((len(_KINDS), 6))
+    for row, kind in zip(scales, _KINDS):
+        if kind in hidden:
+            s, unit = hidden[kind].scales, hidden[kind].unit
+            row[:] = s.middle, s.reach, s.velocity, s.lasts, s.hertz, unit
+    remembers = _RESONANCE if "resonance" in hidden else _FORCE
+    clock = interval * round(settle / interval)
+    whole = _Rig(rig.profile(), numbers, scales, remembers, speed, clock)
     count = round((settle + duration) / interval)
-    rows, struck = _run(*_compiled(effect), whole, interval, count)
+    rows, struck = _run(*_compiled(effects), whole, interval, count)
     impacts = np.array(struck).reshape(-1, 3)
     return rows[round(settle / interval) :], impacts[impacts[:, 0] >= 0]
 
 
 @functools.cache
-def _compiled(effect: Effect) -> tuple[Callable, Callable]:
-    """The value of an effect and the rates of its states, two for every effect."""
-    value = numba.njit(effect.value)
-    if effect.memory is None:
+def _compiled(effects: tuple[Effect, ...]) -> tuple[Callable, Callable]:
+    """The value of the effect of a given kind, and the rates of the states of all
+    effects, two in total.
+    """
+    force, resonance, restitution, surface = (numba.njit(one.value) for one in effects)
+
+    @numba.njit
+    def value(kind, u, w, phi, t, s):
+        if kind == _FORCE:
+            return force(u, w, phi, t, s)
+        if kind == _RESONANCE:
+            return resonance(u, w, phi, t, s)
+        if kind == _RESTITUTION:
+            return restitution(u, w, phi, t, s)
+        return surface(u, w, phi, t, s)
+
+    remembering = [one for one in effects if one.memory is not None]
+    if not remembering:
         return value, numba.njit(lambda own, u, rate, hertz: (0.0, 0.0))
+    (effect,) = remembering
+    assert effect.memory is not None
     memory = numba.njit(effect.memory)
     if effect.states == 1:
         alone = memory
@@ -93,24 +112,23 @@ def _compiled(effect: Effect) -> tuple[Callable, Callable]:
 
 
 @numba.njit
-def _effect(value, rig, t, x, v, s):
-    middle, reach, velocity, duration, _, size = rig.scales
+def _effect(value, kind, rig, t, x, v, s):
+    middle, reach, velocity, duration, _, size = rig.scales[kind]
     share = min(max((t - rig.clock) / duration, 0.0), 1.0)
     angle = _drive(t, rig.speed, rig.numbers)[0]
-    return size * value((x - middle) / reach, v / velocity, angle, share, s)
+    return size * value(kind, (x - middle) / reach, v / velocity, angle, share, s)
 
 
 @numba.njit
 def _ground(value, rig, t):
     """Angle, velocity and acceleration of a follower in contact."""
     x, v, a = _surface(t, rig.speed, rig.numbers, rig.harmonics)
-    if rig.kind == _SURFACE:
-        low = _effect(value, rig, t - _SMALL, 0.0, 0.0, 0.0)
-        here = _effect(value, rig, t, 0.0, 0.0, 0.0)
-        high = _effect(value, rig, t + _SMALL, 0.0, 0.0, 0.0)
-        x += here
-        v += (high - low) / (2 * _SMALL)
-        a += (high - 2 * here + low) / _SMALL**2
+    low = _effect(value, _SURFACE, rig, t - _SMALL, 0.0, 0.0, 0.0)
+    here = _effect(value, _SURFACE, rig, t, 0.0, 0.0, 0.0)
+    high = _effect(value, _SURFACE, rig, t + _SMALL, 0.0, 0.0, 0.0)
+    x += here
+    v += (high - low) / (2 * _SMALL)
+    a += (high - 2 * here + low) / _SMALL**2
     return x, v, a
 
 
@@ -118,14 +136,14 @@ def _ground(value, rig, t):
 def _free(value, rig, t, x, v, own):
     """Acceleration of a follower that is not in contact."""
     a = _acceleration(t, x, v, rig.speed, rig.numbers, rig.clock)
-    if rig.kind == _FORCE or rig.kind == _RESONANCE:
-        a += _effect(value, rig, t, x, v, own[0])
+    a += _effect(value, _FORCE, rig, t, x, v, own[0])
+    a += _effect(value, _RESONANCE, rig, t, x, v, own[0])
     return a
 
 
 @numba.njit
 def _rates(value, memory, rig, t, x, v, own):
-    middle, reach, hertz = rig.scales[0], rig.scales[1], rig.scales[4]
+    middle, reach, _, _, hertz, _ = rig.scales[rig.remembers]
     a = _free(value, rig, t, x, v, own)
     return a, *memory(own, (x - middle) / reach, v / reach, hertz)
 
@@ -208,9 +226,8 @@ def _run(value, memory, rig, interval, count):
                 (t - rig.clock, approach, _drive(t, rig.speed, rig.numbers)[0])
             )
             r = rig.numbers[4]
-            if rig.kind == _RESTITUTION:
-                s = abs(approach) / rig.scales[2]
-                r *= math.exp(_effect(value, rig, t, x, v, s))
+            s = abs(approach) / rig.scales[_RESTITUTION, 2]
+            r *= math.exp(_effect(value, _RESTITUTION, rig, t, x, v, s))
             v = rate + r * approach
             pull = acceleration - _free(value, rig, t, x, v, own)
             flight = 2 * r * approach / pull if pull > 0 else interval

@@ -6,7 +6,7 @@ drive angle, `t` the elapsed fraction of the record, and `s` the approach speed 
 by its largest value.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -424,3 +424,39 @@ class Hidden(NamedTuple):
             return ()
         u, rate = (x - scales.middle) / scales.reach, v / scales.reach
         return self.effect.memory(own, u, rate, scales.hertz)
+
+
+def by_kind(hidden: Sequence[Hidden]) -> dict[str, Hidden]:
+    """Effects by their kind; several of the same kind are added up."""
+    kinds = dict.fromkeys(one.effect.kind for one in hidden)
+    return {
+        kind: _added([one for one in hidden if one.effect.kind == kind])
+        for kind in kinds
+    }
+
+
+def _added(hidden: Sequence[Hidden]) -> Hidden:
+    """One effect in place of several of the same kind, at most one with memory."""
+    if len(hidden) == 1:
+        return hidden[0]
+    first, second, *more = hidden
+    scales, effect, other = first.scales, first.effect, second.effect
+    own = second.scales
+    # numba compiles functions of functions that are marked
+    values = register_jitable(effect.value), register_jitable(other.value)
+    one, another = values
+    share = second.unit / first.unit
+    stretch, fast = scales.reach / own.reach, scales.velocity / own.velocity
+    shift = (scales.middle - own.middle) / own.reach
+
+    def value(u, w, phi, t, s):
+        return one(u, w, phi, t, s) + share * another(
+            stretch * u + shift, fast * w, phi, t, s
+        )
+
+    (memory, states), *_ = sorted(
+        ((e.memory, e.states) for e in (effect, other)), key=lambda pair: -pair[1]
+    )
+    arguments = tuple(dict.fromkeys((*effect.arguments, *other.arguments)))
+    both = Effect(effect.kind, arguments, value, effect.size, memory, states)
+    return _added([Hidden(both, first.size, scales), *more])

@@ -1,6 +1,7 @@
 """The rigs that hidden effects are added to: those in `docs/rigs`, a cam-follower."""
 
 import importlib
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from benchmarks._hidden_physics import Effect, Hidden
@@ -47,8 +48,10 @@ class MadeRig(NamedTuple):
             return random_rig(self.given, rng)
         return drawn(self.given, rng)
 
-    def made(self, truth, rng, hidden: Hidden | None) -> list[tuple[Recording, Motion]]:
-        """Recordings with an effect, and the motions behind them.
+    def made(
+        self, truth, rng, hidden: Sequence[Hidden] = ()
+    ) -> list[tuple[Recording, Motion]]:
+        """Recordings with effects, and the motions behind them.
 
         **Raises:** `Accumulates` if a rig other than the cam-follower comes to rest on
         a constraint.

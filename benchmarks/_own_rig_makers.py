@@ -5,13 +5,13 @@ impact with scipy's DOP853.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks._hidden_physics import Hidden
+from benchmarks._hidden_physics import by_kind, Hidden
 from jaxcam.recordings import Recording
 
 
@@ -152,9 +152,7 @@ def record_case(
 
     **Raises:** `Accumulates` if the rig comes to rest on a constraint.
     """
-    return [
-        run for run, _ in made_case(name, setup, truth, rng, None, duration, records)
-    ]
+    return [run for run, _ in made_case(name, setup, truth, rng, (), duration, records)]
 
 
 def made_case(
@@ -162,30 +160,27 @@ def made_case(
     setup,
     truth: dict[str, float],
     rng,
-    hidden: Hidden | None,
+    hidden: Sequence[Hidden],
     duration: float = 6.0,
     records: int = 4,
     speeds: tuple[float, float] | None = None,
 ) -> list[tuple[Recording, Motion]]:
-    """Make recordings with a hidden effect, and return them with the underlying
-    motions.
+    """Make recordings with hidden effects, and return them with the underlying motions.
 
     `speeds`: smallest and largest, instead of those of the rig.
     """
-    maker, found = MAKERS[name], []
+    maker, found, kinds = MAKERS[name], [], by_kind(hidden)
     for k in range(records):
         if maker.speeds is None:
-            motion, channels = _with_input(maker, setup, truth, rng, duration, hidden)
+            motion, channels = _with_input(maker, setup, truth, rng, duration, kinds)
             called = f"run{k + 1}"
         else:
             ends = speeds or maker.speeds
             low, high = np.linspace(*ends, records + 1)[k : k + 2]
             speed = float(rng.uniform(low, high))
-            motion, channels = _driven(
-                maker, setup, truth, rng, duration, speed, hidden
-            )
+            motion, channels = _driven(maker, setup, truth, rng, duration, speed, kinds)
             called = f"run{k + 1}_{speed / (2 * math.pi):.3f}Hz"
-        channels |= _measured(maker, setup, motion, rng, hidden)
+        channels |= _measured(maker, setup, motion, rng, kinds)
         found.append((Recording(called, motion.time, channels), motion))
     return found
 
@@ -235,9 +230,9 @@ def _measured(maker, setup, motion, rng, hidden) -> dict[str, np.ndarray]:
     for number, (name, place) in enumerate(maker.channels.items()):
         sensor = setup.model.sensors[name]
         shown = np.array(motion.states[:, place])
-        if hidden is not None and hidden.effect.kind == "sensor" and not number:
+        if "sensor" in hidden and not number:
             x, v = motion.states[:, 0], motion.states[:, 1]
-            shown += hidden.at(x, v, motion.angle, motion.time)
+            shown += hidden["sensor"].at(x, v, motion.angle, motion.time)
         noisy = shown + float(sensor.noise) * rng.standard_normal(len(shown))
         step = sensor.resolution
         found[name] = np.round(noisy / step) * step if step else noisy
@@ -245,7 +240,7 @@ def _measured(maker, setup, motion, rng, hidden) -> dict[str, np.ndarray]:
 
 
 class _Flight:
-    """A rig with its hidden effect, integrated from impact to impact.
+    """A rig with its hidden effects by kind, integrated from impact to impact.
 
     `begin` is the time at which the record begins. The states of an effect are appended
     to those of the rig.
@@ -255,26 +250,25 @@ class _Flight:
         self.maker, self.truth, self.drive = maker, truth, drive
         self.hidden, self.begin = hidden, begin
         self.own = len(maker.start)
-
-    def acts(self, kind: str) -> bool:
-        return self.hidden is not None and self.hidden.effect.kind == kind
+        self.states = sum(one.effect.states for one in hidden.values())
 
     def field(self, t, x, u=0.0):
         drive = self.drive(t)
         found = list(self.maker.field(self.truth, x[: self.own], drive, u))
-        if self.hidden is None:
-            return found
-        own = x[self.own :]
-        if self.acts("force") or self.acts("resonance"):
-            more = own[0] if len(own) else 0.0
-            found[1] += self.hidden.at(x[0], x[1], drive[0], t - self.begin, more)
-        return [*found, *self.hidden.rates(own, x[0], x[1])]
+        own, rates = x[self.own :], ()
+        for kind, one in self.hidden.items():
+            if kind in ("force", "resonance"):
+                more = own[0] if one.effect.states else 0.0
+                found[1] += one.at(x[0], x[1], drive[0], t - self.begin, more)
+                rates = (*rates, *one.rates(own, x[0], x[1]))
+        return [*found, *rates]
 
     def surface(self, t):
         """Outward displacement of the first surface."""
-        if not self.acts("surface"):
+        if "surface" not in self.hidden:
             return 0.0
-        return float(self.hidden.at(0.0, 0.0, self.drive(t)[0], t - self.begin))
+        angle = self.drive(t)[0]
+        return float(self.hidden["surface"].at(0.0, 0.0, angle, t - self.begin))
 
     def gap(self, k):
         def gap(t, x):
@@ -291,10 +285,10 @@ class _Flight:
         moved = np.array(x[: self.own])
         if k == 0:
             moved[1] -= rate
-        if k == 0 and self.acts("restitution"):
-            angle = self.drive(t)[0]
-            speed = abs(x[1]) / self.hidden.scales.velocity
-            more = self.hidden.at(x[0], x[1], angle, t - self.begin, speed)
+        if k == 0 and "restitution" in self.hidden:
+            angle, law = self.drive(t)[0], self.hidden["restitution"]
+            speed = abs(x[1]) / law.scales.velocity
+            more = law.at(x[0], x[1], angle, t - self.begin, speed)
             name = self.maker.restitution
             truth = truth | {name: truth[name] * math.exp(more)}
         after = self.maker.impacts[k](truth, moved)
@@ -304,8 +298,7 @@ class _Flight:
 
     def flown(self, state, settle, time):
         """States of the rig at `settle + time`, and impacts on the first constraint."""
-        if self.hidden is not None:
-            state = np.concatenate([state, np.zeros(self.hidden.effect.states)])
+        state = np.concatenate([state, np.zeros(self.states)])
         events = [self.gap(k) for k in range(len(self.maker.impacts))]
         wanted, struck = settle + time, []
         found = np.zeros((len(time), len(state)))
@@ -338,8 +331,7 @@ class _Flight:
 
     def held(self, state, inputs):
         """States at every sample, with an input held constant between samples."""
-        if self.hidden is not None:
-            state = np.concatenate([state, np.zeros(self.hidden.effect.states)])
+        state = np.concatenate([state, np.zeros(self.states)])
         found, parts = [state], 4
         h = INTERVAL / parts
         for k, u in enumerate(inputs[:-1]):

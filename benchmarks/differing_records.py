@@ -29,7 +29,7 @@ def recordings_of(rig: str, setup, name: str, step: float, seed: int):
         values = truth[name] * (1 + step * places)
         try:
             runs = [
-                made_case(rig, setup, truth | {name: value}, rng, None)[k][0]
+                made_case(rig, setup, truth | {name: value}, rng, ())[k][0]
                 for k, value in enumerate(values)
             ]
         except Accumulates:

@@ -5,10 +5,12 @@ The cases are made as those of `benchmarks.unnamed`, with an effect of the libra
 instead, or in addition. A verdict is correct if it names this effect alone, with a
 strength within 15 % or two standard errors of the true one, and removes nine tenths of
 the squared error above the noise on held-out data; and, with `--beside`, if it also
-models the unnamed force by the criteria of `benchmarks.unnamed`.
+models the unnamed effect by the criteria of `benchmarks.unnamed`. With `--any`, the
+unnamed effect is drawn at random from those that the rig admits.
 
     python -m benchmarks.named stage
     python -m benchmarks.named two_stops --effects coulomb_friction --beside stop
+    python -m benchmarks.named pendulum_wall --any --first 5 --cases 3
 """
 
 import argparse
@@ -19,7 +21,6 @@ import numpy as np
 
 from benchmarks._hidden_physics import direction, Effect, EFFECTS, Hidden, Scales
 from benchmarks._made_rigs import made_rig, MadeRig, NAMES
-from benchmarks._optional_numba import register_jitable
 from benchmarks._own_rig_makers import Accumulates
 from benchmarks._verdicts import close
 from benchmarks.unnamed import function_off, scales_of
@@ -35,11 +36,17 @@ def _force(value, low: float, high: float) -> Effect:
     return Effect("force", (), value, (low, high))
 
 
+# periods of a vibration in a record
+_CYCLES = 201.3
+
 # the effects as in `_hidden_physics.py`
 NAMED = {
     "coulomb_friction": _force(lambda u, w, phi, t, s: -direction(w), 0.01, 0.04),
     "quadratic_drag": _force(lambda u, w, phi, t, s: -w * abs(w), 0.05, 0.2),
     "nonlinear_spring": _force(lambda u, w, phi, t, s: -(u**3), 0.1, 0.3),
+    "external_vibration": _force(
+        lambda u, w, phi, t, s: np.sin(2 * np.pi * _CYCLES * t + 1.0), 0.02, 0.06
+    ),
     # `s` in units of the reference speed
     "restitution_velocity": Effect(
         "restitution", (), lambda u, w, phi, t, s: -np.log1p(s), (0.03, 0.1)
@@ -50,26 +57,13 @@ NAMED = {
 def strength_of(name: str, hidden: Hidden) -> float | None:
     """The strength of an effect as the library defines it, or `None` for a spring."""
     size = hidden.size * hidden.scales.acceleration
-    if name == "coulomb_friction":
+    if name in ("coulomb_friction", "external_vibration"):
         return size
     if name == "quadratic_drag":
         return size / hidden.scales.velocity**2
     if name == "restitution_velocity":
         return hidden.size
     return None
-
-
-def together(one: Hidden, other: Hidden) -> Hidden:
-    """Two forces as one."""
-
-    # numba compiles functions of functions that are marked
-    first, second = (register_jitable(each.effect.value) for each in (one, other))
-    size, more = one.size, other.size
-
-    def value(u, w, phi, t, s):
-        return size * first(u, w, phi, t, s) + more * second(u, w, phi, t, s)
-
-    return Hidden(_force(value, 1.0, 1.0), 1.0, one.scales)
 
 
 def hidden_case(rig: MadeRig, effect: str, beside: str | None, seed: int):
@@ -81,16 +75,16 @@ def hidden_case(rig: MadeRig, effect: str, beside: str | None, seed: int):
     for _ in range(_DRAWS):
         truth = rig.drawn(rng)
         try:
-            bare = rig.made(truth, rng, None)
+            bare = rig.made(truth, rng)
             scales = scales_of(rig, [motion for _, motion in bare])
+            own = scales
             if effect == "nonlinear_spring":
-                scales = scales._replace(middle=rig.centre)
+                own = scales._replace(middle=rig.centre)
             if effect == "restitution_velocity":
-                scales = scales._replace(velocity=_IMPACT_SPEED)
-            named = _sized(NAMED[effect], scales, rng)
+                own = scales._replace(velocity=_IMPACT_SPEED)
+            named = _sized(NAMED[effect], own, rng)
             other = None if beside is None else _sized(EFFECTS[beside], scales, rng)
-            both = named if other is None else together(named, other)
-            made = rig.made(truth, rng, both)
+            made = rig.made(truth, rng, [named] if other is None else [named, other])
         except Accumulates:
             continue
         runs, motions = map(list, zip(*made))
@@ -110,7 +104,7 @@ def judged(found, effect: str, named: Hidden, other: Hidden | None, motions):
     right = names == [effect]
     if right and true is not None:
         (one,) = (one for one in found.effects if one.name == effect)
-        (fitted,) = one.parameters.values()
+        fitted = next(iter(one.parameters.values()))
         strength = fitted.value / true
         right = close(true, fitted.value, fitted.stderr)
     said.append(f"strength {strength:.3f} of the true one")
@@ -131,28 +125,41 @@ def judged(found, effect: str, named: Hidden, other: Hidden | None, motions):
     return right, f"{'; '.join(said)}; {found.heldout_after / floor:.2f} noises left"
 
 
+def _drawn(rig: MadeRig, effect: str, seed: int) -> str:
+    """The name of an effect that the rig admits; not another law of restitution."""
+    kind = NAMED[effect].kind
+    both = [
+        name
+        for name, one in EFFECTS.items()
+        if rig.admits(one) and not kind == one.kind == "restitution"
+    ]
+    rng = np.random.default_rng([seed, *f"beside {effect}".encode()])
+    return both[int(rng.integers(len(both)))]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rig", choices=NAMES)
     parser.add_argument("--effects", nargs="*", choices=sorted(NAMED))
-    forces = sorted(name for name, one in EFFECTS.items() if one.kind == "force")
-    parser.add_argument("--beside", choices=forces, help="a further, unnamed force")
+    beside = parser.add_mutually_exclusive_group()
+    beside.add_argument("--beside", choices=EFFECTS, help="a further, unnamed effect")
+    beside.add_argument("--any", action="store_true", help="beside a random effect")
     parser.add_argument("--first", type=int, default=0, help="seed of first case")
     parser.add_argument("--cases", type=int, default=1, help="cases per effect")
     args = parser.parse_args()
     rig, count, correct = made_rig(args.rig), 0, 0
     for name in args.effects or NAMED:
-        if NAMED[name].kind == "restitution":
-            if args.beside or not rig.struck:
-                continue
+        if not rig.admits(NAMED[name]):
+            continue
         for seed in range(args.first, args.first + args.cases):
-            named, other, runs, motions = hidden_case(rig, name, args.beside, seed)
+            unnamed = _drawn(rig, name, seed) if args.any else args.beside
+            named, other, runs, motions = hidden_case(rig, name, unnamed, seed)
             begun, spent = time.time(), time.process_time()
             found = diagnose(rig.given, runs, case=f"{args.rig} {name} {seed}")
             good, why = judged(found, name, named, other, motions)
             count, correct = count + 1, correct + good
             print(
-                f"{name}{f' and {args.beside}' if args.beside else ''} {seed}: "
+                f"{name}{f' and {unnamed}' if unnamed else ''} {seed}: "
                 f"{'right' if good else 'WRONG'}: {why} [{time.time() - begun:.0f} s, "
                 f"{time.process_time() - spent:.0f} s of CPU]\n    {found.summary}",
                 flush=True,

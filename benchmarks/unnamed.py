@@ -63,11 +63,11 @@ def hidden_case(rig: MadeRig, effect: str, seed: int):
     for _ in range(_DRAWS):
         truth = rig.drawn(rng)
         try:
-            bare = rig.made(truth, rng, None)
+            bare = rig.made(truth, rng)
             scales = scales_of(rig, [motion for _, motion in bare])
             one = EFFECTS[effect]
             hidden = Hidden(one, float(rng.uniform(*one.size)), scales)
-            made = rig.made(truth, rng, hidden)
+            made = rig.made(truth, rng, (hidden,))
         except Accumulates:
             continue
         runs, motions = map(list, zip(*made))

@@ -8,9 +8,9 @@ import pytest
 
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search._blocks import _usable, moved
-from jaxcam.discrepancy.search._formulas import parts_lacking
 from jaxcam.discrepancy.search._gains import distinct_step, newton_step
 from jaxcam.discrepancy.search._left_out import LeftOut
+from jaxcam.discrepancy.search._left_over import parts_lacking
 
 
 def _found(functions, cost, samples=1000, score=None, names=frozenset()):

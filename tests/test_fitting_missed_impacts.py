@@ -47,7 +47,7 @@ def bouncing():
     while True:
         truth = drawn(setup, rng)
         try:
-            made = made_case("pendulum_wall", setup, truth, rng, None)
+            made = made_case("pendulum_wall", setup, truth, rng, ())
         except Accumulates:
             continue
         return setup, [run for run, _ in made], [motion for _, motion in made]

@@ -17,6 +17,7 @@ from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of
 from ._hidden_state import Hidden
 from ._leads import shows_apart
+from ._left_over import leaves_noise
 from ._named_parts import friction_named, with_named_friction
 from ._roughness import Roughness
 from ._slots import emptied, Free, Part, replaced
@@ -240,33 +241,3 @@ def _sound(trial: Missing, one: Free) -> bool:
     assert isinstance(form, Free) and form.primitive is not None
     numbers = _numbers_of(trial, form).tolist()
     return math.isfinite(trial.score) and form.within(numbers)
-
-
-def leaves_noise(fits: FreeFits, found: Missing, small: float = 0.0) -> bool:
-    """Return whether the cost of a fit is no larger than the noise explains.
-
-    **Arguments:** `small`: the tolerated residual; a fraction
-    `Policy.negligible_residual` of it is treated as noise.
-    """
-    samples = found.problem.samples
-    surplus = fits.policy.cost_errors * math.sqrt(2 * samples)
-    return found.fit.cost < samples + max(
-        surplus, fits.policy.negligible_residual * small
-    )
-
-
-def parts_lacking(
-    fits: FreeFits, curve: Missing, found: Missing, whole: Missing
-) -> bool:
-    """Return whether functions or terms that the `curve` leaves out are needed, in
-    spite of the formulas `found`: only the `whole` fit leaves nothing but noise, or the
-    fit is poor and they explain most of what remains.
-    """
-    few, many = (len(one.functions) + len(one.names) for one in (curve, whole))
-    if few == many or leaves_noise(fits, found):
-        return False
-    if leaves_noise(fits, whole):
-        return True
-    samples, policy = found.problem.samples, fits.policy
-    left, rest = found.fit.cost - samples, whole.fit.cost - samples
-    return heat_of(found.fit) > policy.near_cost and rest < policy.explains * left

@@ -17,13 +17,14 @@ from ..terms import Family, own_faults, spelled, Term
 from ._additions import Additions
 from ._clock import Clock
 from ._element_need import ElementNeed
-from ._formulas import formulated, leaves_noise, parts_lacking
+from ._formulas import formulated
 from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of
 from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
 from ._leads import Lead, Leads, others, tie
 from ._left_out import LeftOut
+from ._left_over import completes, completing_gain, leaves_noise, parts_lacking
 from ._recentre import recentred
 from ._rooms import Rooms
 from ._shuffled import Shuffled, shuffled
@@ -81,9 +82,7 @@ class FreeSearch:
             self.fits, self.terms, lambda found: rooms.of(found).whole, policy
         )
         self.leads = Leads(self.fits, self.families, faults, policy, progress)
-        self.of_two = TwoArguments(
-            self.fits, families, self.rooms, progress, self.clock
-        )
+        self.of_two = TwoArguments(self.fits, families, rooms, progress, self.clock)
 
     def repeated(self, elements: bool) -> "FreeSearch":
         """Return a search with elements among the candidates, or with functions alone;
@@ -137,7 +136,10 @@ class FreeSearch:
         self.tried += trials
         trials.sort(key=lambda trial: trial.score)
         if trials and not self._suffices(trials[0]) and not self.clock.over:
-            more = self._pruned(self._grown(trials[0], False))
+            whole = self._grown(trials[0], False)
+            more = self._pruned(whole)
+            if parts_lacking(self.fits, more, more, whole):
+                more = whole
             trials = [more, *trials] if more.functions else trials
         return trials
 
@@ -264,8 +266,7 @@ class FreeSearch:
             for lead in leads:
                 if self._done(best, lead, leads[0]) or self.clock.over:
                     break
-                said = spelled(lead.label)
-                self.progress(f"fitting {said}", None)
+                self.progress(f"fitting {spelled(lead.label)}", None)
                 trial = self.additions.fitted(found, lead, apart, found.score)
                 if trial is not None and not apart:
                     self.tried.append(trial)
@@ -278,7 +279,8 @@ class FreeSearch:
                 break
             if found.functions and grown < self._worthwhile(found):
                 break
-            if not apart and found.functions and grown < self._small(found):
+            small = not apart and found.functions and grown < self._small(found)
+            if small and not completes(self.fits, found, best):
                 break
             found = best
         return found
@@ -326,10 +328,15 @@ class FreeSearch:
         if not leads:
             return []
         least = max(self._least(), self.policy.promising * leads[0].gain)
+        terms = enough = least
         if found.functions:
             more = self._worthwhile(found) if apart else self._small(found)
-            least = max(least, more / heat_of(found.fit))
-        return [lead for lead in leads if lead.gain > least][: self.policy.followed]
+            enough = terms = max(least, more / heat_of(found.fit))
+            if not apart:
+                terms = max(least, min(enough, completing_gain(self.fits, found)))
+        return [lead for lead in leads if lead.gain > (terms if lead.name else enough)][
+            : self.policy.followed
+        ]
 
     def _swapped(self, found: Missing, share: float = 0.0) -> Missing:
         room = self.rooms.of(found)

@@ -21,10 +21,10 @@ from ._bivariate_likelihood import (
     Nodes,
 )
 from ._clock import Clock
-from ._formulas import leaves_noise
 from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of, heated
 from ._leads import Lead
+from ._left_over import leaves_noise
 from ._local_force import force_response, forces_at_nodes
 from ._product_forms import ProductSearch, ProductStart
 from ._product_search import Products
