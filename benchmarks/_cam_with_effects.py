@@ -1,4 +1,4 @@
-"""Simulate a cam-follower rig with any effect from `_hidden_physics.py`, in numba.
+"""Simulate a cam-follower rig with any effect from `_hidden_effects.py`, in numba.
 
 It shares no code with `jaxcam.hybrid`: Runge-Kutta steps between samples, and events
 located by bisection.

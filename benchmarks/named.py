@@ -19,7 +19,8 @@ import time
 
 import numpy as np
 
-from benchmarks._hidden_physics import direction, Effect, EFFECTS, Hidden, Scales
+from benchmarks._hidden_effects import EFFECTS
+from benchmarks._hidden_physics import direction, Effect, force, Hidden, Scales
 from benchmarks._made_rigs import made_rig, MadeRig, NAMES
 from benchmarks._own_rig_makers import Accumulates
 from benchmarks._verdicts import close
@@ -32,20 +33,16 @@ _DRAWS = 40
 _IMPACT_SPEED = 0.3
 
 
-def _force(value, low: float, high: float) -> Effect:
-    return Effect("force", (), value, (low, high))
-
-
 # periods of a vibration in a record
 _CYCLES = 201.3
 
-# the effects as in `_hidden_physics.py`
+# the effects as in `_hidden_effects.py`
 NAMED = {
-    "coulomb_friction": _force(lambda u, w, phi, t, s: -direction(w), 0.01, 0.04),
-    "quadratic_drag": _force(lambda u, w, phi, t, s: -w * abs(w), 0.05, 0.2),
-    "nonlinear_spring": _force(lambda u, w, phi, t, s: -(u**3), 0.1, 0.3),
-    "external_vibration": _force(
-        lambda u, w, phi, t, s: np.sin(2 * np.pi * _CYCLES * t + 1.0), 0.02, 0.06
+    "coulomb_friction": force((), lambda u, w, phi, t, s: -direction(w), 0.01, 0.04),
+    "quadratic_drag": force((), lambda u, w, phi, t, s: -w * abs(w), 0.05, 0.2),
+    "nonlinear_spring": force((), lambda u, w, phi, t, s: -(u**3), 0.1, 0.3),
+    "external_vibration": force(
+        (), lambda u, w, phi, t, s: np.sin(2 * np.pi * _CYCLES * t + 1.0), 0.02, 0.06
     ),
     # `s` in units of the reference speed
     "restitution_velocity": Effect(

@@ -1,7 +1,7 @@
 """Test whether effects without a name are modelled.
 
 The rigs in `docs/rigs`, or the cam-follower in `jaxcam/data/demo_rig`, are drawn at
-random within their tolerances, each with one effect from `_hidden_physics.py`,
+random within their tolerances, each with one effect from `_hidden_effects.py`,
 simulated by independent code, recorded through noisy sensors, and diagnosed. A verdict
 is correct if it gives the kind and arguments of the hidden effect and names nothing
 else, if it removes nine tenths of the squared error above the noise on held-out data,
@@ -20,7 +20,8 @@ import time
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from benchmarks._hidden_physics import EFFECTS, Hidden, Scales
+from benchmarks._hidden_effects import EFFECTS
+from benchmarks._hidden_physics import Hidden, Scales
 from benchmarks._made_rigs import made_rig, MadeRig, NAMES
 from benchmarks._own_rig_makers import Accumulates, MAKERS, Motion
 from jaxcam.discrepancy import diagnose, Diagnosis, Policy

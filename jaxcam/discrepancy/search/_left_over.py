@@ -47,6 +47,6 @@ def completes(fits: FreeFits, found: Missing, more: Missing) -> bool:
 
 
 def completing_gain(fits: FreeFits, found: Missing) -> float:
-    """Return the predicted gain from which a term may explain all that functions leave."""
+    """Return the least predicted gain of a term that may explain all that is left."""
     left = found.fit.cost - found.problem.samples
     return fits.policy.explains * left / heat_of(found.fit)
