@@ -10,7 +10,7 @@ from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search._blocks import _usable, moved
 from jaxcam.discrepancy.search._gains import distinct_step, newton_step
 from jaxcam.discrepancy.search._left_out import LeftOut
-from jaxcam.discrepancy.search._left_over import parts_lacking
+from jaxcam.discrepancy.search._left_over import completes, parts_lacking
 
 
 def _found(functions, cost, samples=1000, score=None, names=frozenset()):
@@ -48,6 +48,28 @@ def test_functions_that_explain_most_of_the_rest_are_kept(
     # a formula that consists of a term and a form does not replace another function
     both = _found(["a", "c"], left)
     assert parts_lacking(fits, fewer, both, whole) is needed
+
+
+@pytest.mark.parametrize(
+    "left, rest, names, complete",
+    [
+        # a term that leaves only noise explains all, however small it is
+        (1000.0, 1300.0, {"drag"}, True),
+        # if the functions leave only noise themselves, nothing is left to explain
+        (1000.0, 1005.0, {"drag"}, False),
+        # more than noise remains
+        (1200.0, 3000.0, {"drag"}, False),
+        # another function may only represent an error of the first
+        (1000.0, 1300.0, set(), False),
+    ],
+)
+def test_a_small_term_is_named_if_it_explains_all_that_is_left(
+    left, rest, names, complete, unchecked_types
+):
+    fits: Any = types.SimpleNamespace(policy=Policy())
+    found = _found(["a"], rest)
+    more = _found(["a"], left, names=frozenset(names))
+    assert completes(fits, found, more) is complete
 
 
 def test_a_function_that_explains_much_is_not_fitted_without(

@@ -40,13 +40,19 @@ def completes(fits: FreeFits, found: Missing, more: Missing) -> bool:
     """Return whether a term in addition to a fit explains all that its functions leave,
     however little that is.
     """
-    if more.names == found.names or not leaves_noise(fits, more):
+    if more.names == found.names:
+        return False
+    if leaves_noise(fits, found) or not leaves_noise(fits, more):
         return False
     left, rest = (one.fit.cost - one.problem.samples for one in (more, found))
     return left < fits.policy.negligible_residual * rest
 
 
 def completing_gain(fits: FreeFits, found: Missing) -> float:
-    """Return the least predicted gain of a term that may explain all that is left."""
+    """Return the least predicted gain of a term that may explain all that is left;
+    infinite if nothing but noise is left.
+    """
+    if leaves_noise(fits, found):
+        return math.inf
     left = found.fit.cost - found.problem.samples
     return fits.policy.explains * left / heat_of(found.fit)
