@@ -135,7 +135,8 @@ class FreeSearch:
         trials = self.of_two.tried(bare, found, least, small)
         self.tried += trials
         trials.sort(key=lambda trial: trial.score)
-        if trials and not self._suffices(trials[0]) and not self.clock.over:
+        noise = not trials or leaves_noise(self.fits, trials[0])
+        if not (noise or self.clock.over):
             whole = self._grown(trials[0], False)
             more = self._pruned(whole)
             if parts_lacking(self.fits, more, more, whole):
