@@ -135,8 +135,7 @@ class FreeSearch:
         trials = self.of_two.tried(bare, found, least, small)
         self.tried += trials
         trials.sort(key=lambda trial: trial.score)
-        noise = not trials or leaves_noise(self.fits, trials[0])
-        if not (noise or self.clock.over):
+        if trials and not (leaves_noise(self.fits, trials[0]) or self.clock.over):
             whole = self._grown(trials[0], False)
             more = self._pruned(whole)
             if parts_lacking(self.fits, more, more, whole):
