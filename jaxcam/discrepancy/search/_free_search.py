@@ -22,7 +22,7 @@ from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of
 from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
-from ._leads import Lead, Leads, others, tie
+from ._leads import Lead, Leads, of_two_arguments, others, tie
 from ._left_out import LeftOut
 from ._left_over import completes, completing_gain, leaves_noise, parts_lacking
 from ._recentre import recentred
@@ -136,10 +136,9 @@ class FreeSearch:
         self.tried += trials
         trials.sort(key=lambda trial: trial.score)
         if trials and not (leaves_noise(self.fits, trials[0]) or self.clock.over):
-            whole = self._grown(trials[0], False)
-            more = self._pruned(whole)
-            if parts_lacking(self.fits, more, more, whole):
-                more = whole
+            more = self._grown(trials[0], False)
+            if not completes(self.fits, trials[0], more):
+                more = self._pruned(more)
             trials = [more, *trials] if more.functions else trials
         return trials
 
@@ -257,9 +256,10 @@ class FreeSearch:
             if apart and heat_of(found.fit) < self.policy.as_noise:
                 # single pieces of flight contain little information on small effects
                 break
+            if of_two_arguments(found) and leaves_noise(self.fits, found):
+                break
             room = self.rooms.of(found)
-            problem = room.apart if apart else room.whole
-            leads = self._ranked(problem, found, apart)
+            leads = self._ranked(room.apart if apart else room.whole, found, apart)
             if self.need.preferred:
                 break
             best = found

@@ -17,6 +17,7 @@ from ._hidden_leads import worthwhile
 from ._hidden_scan import Promise
 from ._hidden_signals import Driven
 from ._hidden_state import Hidden
+from ._left_over import completing_gain
 from ._local_force import force_blocks, force_response, Response
 from ._roughness import Roughness, roughness
 from ._slots import filled, Free, free_term, slots_of
@@ -88,11 +89,14 @@ class Leads:
                 return leads
         self.progress("searching the residuals for functions", None)
         heated_problem = _heated(problem, found)
-        leads = [
-            *self._in_flight(heated_problem, found),
-            *self._elsewhere(heated_problem, found, apart),
-            *self._terms(heated_problem, found),
-        ]
+        leads = list(self._terms(heated_problem, found))
+        enough = (
+            completing_gain(self.fits, found) if of_two_arguments(found) else math.inf
+        )
+        # other functions beside one of two arguments take many times longer to rank
+        if not any(lead.gain > enough for lead in leads):
+            leads += self._in_flight(heated_problem, found)
+            leads += self._elsewhere(heated_problem, found, apart)
         self._known.append((found, problem, apart, leads))
         return leads
 
@@ -232,7 +236,7 @@ def others(
     **Arguments:** all candidates; the fits of single pieces with one of them, by its
     label; the fits of whole recordings; and the policy.
     """
-    of_one = (trial for trial in tried if not _of_two(trial))
+    of_one = (trial for trial in tried if not of_two_arguments(trial))
     fitted = {one.label for trial in of_one for one in trial.functions}
     costs = {label: one.fit.cost for label, one in alone.items()}
     most = policy.hopeless_cost * min(costs.values(), default=math.inf)
@@ -245,7 +249,8 @@ def others(
     ]
 
 
-def _of_two(found: Missing) -> bool:
+def of_two_arguments(found: Missing) -> bool:
+    """Return whether a fit contains a free force of two arguments."""
     return any(isinstance(one, Free) and one.across for one in found.functions)
 
 
