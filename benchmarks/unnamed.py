@@ -28,7 +28,7 @@ from jaxcam.discrepancy import diagnose, Diagnosis, Policy
 
 
 # An effect must act in more than this fraction of the samples or impacts
-_SEEN = 0.05
+SEEN = 0.05
 # Maximum number of rigs in which an effect is tried
 _DRAWS = 40
 _AT_IMPACTS = ("restitution", "surface")  # kinds that belong to a constraint
@@ -72,12 +72,12 @@ def hidden_case(rig: MadeRig, effect: str, seed: int):
         except Accumulates:
             continue
         runs, motions = map(list, zip(*made))
-        if one.memory is not None or _share_acting(hidden, motions) > _SEEN:
+        if one.memory is not None or share_acting(hidden, motions) > SEEN:
             return hidden, runs, motions, truth
     raise ValueError(f"{effect} acts in none of {_DRAWS} rigs of {rig.name}")
 
 
-def _share_acting(hidden: Hidden, motions: list[Motion]) -> float:
+def share_acting(hidden: Hidden, motions: list[Motion]) -> float:
     """Share of the samples, or impacts, at which an effect differs from its usual
     value by a twentieth of its range or more."""
     _, true, _ = _along(hidden, motions)
