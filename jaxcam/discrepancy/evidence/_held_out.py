@@ -10,7 +10,14 @@ import numpy as np
 from ...fitting import Fit, fit, Problem, Residuals, residuals
 from ...fitting.engine import cost_by_recording, Weights
 from ..policy import Policy
-from ..search import given_up, Trial, Trials, with_states
+from ..search import (
+    given_up,
+    heat_of,
+    tolerance_at,
+    Trial,
+    Trials,
+    with_states,
+)
 
 
 # Seed that assigns sections to parts; fixed, so that two diagnoses of a case agree
@@ -61,6 +68,7 @@ def held_out(trials: Trials, before: Trial, after: Trial) -> HeldOut:
                 weights=seen,
                 iterations=trials.policy.heldout_iterations,
                 stop=given_up(problem.samples, trials.policy),
+                tolerance=tolerance_at(heat_of(trial.fit)),
             )
             test = with_states(own, known, unseen, trials.policy)
             parts = _parts(test, unseen)

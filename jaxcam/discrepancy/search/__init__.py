@@ -21,6 +21,7 @@ from ._gains import (
     separate_gain as separate_gain,
 )
 from ._given_up import given_up as given_up
+from ._heat import heat_of as heat_of, tolerance_at as tolerance_at
 from ._hidden_state import Hidden as Hidden
 from ._kept_trials import KeptTrials as KeptTrials
 from ._leads import decoys_of as decoys_of

@@ -15,15 +15,10 @@ from ._blocks import blocks_of, values_of
 from ._converged import alike, stuck
 from ._gains import gain
 from ._given_up import given_up
-from ._heat import heat_of, heated, unscaled
+from ._heat import heat_of, heated, tolerance_at, unscaled
 from ._hidden_state import Hidden, recentred, started
 from ._roughness import occam, roughness
 from ._slots import filled, Free, Part
-
-
-# Predicted decrease of the cost, in units of its scale, below which a fit ends: far
-# less than any decision depends on
-_TOLERANCE = 0.1
 
 
 class Missing(NamedTuple):
@@ -118,7 +113,7 @@ class FreeFits:
                 start=point,
                 iterations=iterations or policy.quick_iterations,
                 stop=self._stop(problem.samples, beaten),
-                tolerance=_TOLERANCE * heat,
+                tolerance=tolerance_at(heat),
             )
             point, before, heat = found.point, heat, heat_of(found)
             late = found.iterations >= policy.late_attempts // 2

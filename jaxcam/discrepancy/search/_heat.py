@@ -8,9 +8,19 @@ import numpy as np
 from ...fitting import Fit, Problem
 
 
+# Predicted decrease of the cost, in units of the cost per sample, below which a fit
+# ends: far less than any decision depends on
+_TOLERANCE = 0.1
+
+
 def heat_of(found: Fit) -> float:
     """Return the cost per sample of a fit, or one if that is larger."""
     return max(1.0, found.cost / found.problem.samples)
+
+
+def tolerance_at(heat: float) -> float:
+    """Return the tolerance of a fit whose cost per sample is `heat`."""
+    return _TOLERANCE * heat
 
 
 def heated(problem: Problem, heat: float) -> Problem:
