@@ -94,15 +94,15 @@ def interpolated(tables, place):
     """Return the values of splines at a position in units of their knots."""
     first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
     u = place - first
-    first = first.astype(int)
     weights = (
         (1 - u) ** 3 / 6,
         (3 * u**3 - 6 * u**2 + 4) / 6,
         (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6,
         u**3 / 6,
     )
-
-    def along(table):
-        return sum(w * table[first + k] for k, w in enumerate(weights))
-
-    return jax.tree.map(along, tables)
+    # one slice of all tables compiles faster than a look-up for each of their numbers
+    given, tree = jax.tree.flatten(tables)
+    near = jax.lax.dynamic_slice_in_dim(jnp.stack(given), first.astype(int), 4, axis=1)
+    first, *more = (w * near[:, k] for k, w in enumerate(weights))
+    found = sum(more, first)
+    return jax.tree.unflatten(tree, [found[k] for k in range(len(given))])

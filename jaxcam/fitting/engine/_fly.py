@@ -119,32 +119,34 @@ def _is_one(substeps) -> bool:
 
 def _nodes(model: Model, state, start, step, drive: DriveState, substeps):
     """Return the states at the ends of all steps `(n + 1, s)`, and their rates."""
-    part = step / jnp.asarray(substeps, dtype=float)
+    count = drive.angle.shape[0]
 
     def advance(x, inputs):
-        number, here = inputs
-        t0 = start + number * step
-        system_at = model.during(t0 + step / 2, here)
+        number, within, length, here = inputs
+        t0, h = start + number * step, length * step
+        system_at = model.during(start + (within + 0.5) * step, here)
         if _is_one(substeps):
-            x1, k1 = runge_kutta(model, system_at, t0, x, step)
+            x1, k1 = runge_kutta(model, system_at, t0, x, h)
             return x1, (x, k1)
+        part = h / jnp.asarray(substeps, dtype=float)
 
-        def inner(k, x):
+        def inner(k, given):
+            x, k1 = given
             t = t0 + jnp.asarray(k, dtype=float) * part
-            return runge_kutta(model, system_at, t, x, part)[0]
+            x1, rate = runge_kutta(model, system_at, t, x, part)
+            return x1, jnp.where(k == 0, rate, k1)
 
-        k1 = augmented_field(model, system_at(t0), t0, x)
-        return jax.lax.fori_loop(0, substeps, inner, x), (x, k1)
+        x1, k1 = jax.lax.fori_loop(0, substeps, inner, (x, jnp.zeros_like(x)))
+        return x1, (x, k1)
 
-    count = drive.angle.shape[0]
-    numbers = jnp.arange(count, dtype=float)
-    end, (states, fields) = jax.lax.scan(advance, state, (numbers, drive))
-    t1 = start + count * step
-    final = DriveState(*(part[-1] for part in drive))
-    system = model.during(t1 - step / 2, final)(t1)
-    last = augmented_field(model, system, t1, end)
-    states = jnp.concatenate([states, end[None]])
-    return states, jnp.concatenate([fields, last[None]])
+    # a last step of length zero gives the rate at the end: the vector field is compiled
+    # once only
+    numbers = jnp.arange(count + 1, dtype=float)
+    within = jnp.minimum(numbers, count - 1.0)
+    lengths = jnp.where(numbers < count, 1.0, 0.0)
+    every = jax.tree.map(lambda one: jnp.concatenate([one, one[-1:]]), drive)
+    _, found = jax.lax.scan(advance, state, (numbers, within, lengths, every))
+    return found
 
 
 def runge_kutta(model: Model, system_at, t, x, h):

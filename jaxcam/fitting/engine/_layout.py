@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ...hybrid.programs import program
@@ -79,10 +80,16 @@ class Layout(eqx.Module):
             return jax.jvp(moved, (values,), (unit,))[1]
 
         rows = jax.vmap(pushed)(jnp.eye(len(values)))
-        slopes: list[Any] = [None] * len(leaves)
-        for k, row in zip(moving, rows):
-            slopes[k] = row
-        return Expansion(origin, tuple(slopes))
+        flat = [jnp.ravel(leaves[k]) for k in moving]
+        slopes = [row.reshape(len(values), -1) for row in rows]
+        if not moving:
+            flat, slopes = [jnp.zeros(0)], [jnp.zeros((len(values), 0))]
+        return Expansion(
+            origin,
+            jnp.concatenate(flat),
+            jnp.concatenate(slopes, axis=1),
+            tuple(moving),
+        )
 
 
 class Expansion(eqx.Module):
@@ -91,27 +98,26 @@ class Expansion(eqx.Module):
     The quantities needed at every step are computed and differentiated once, instead of
     in each piece.
 
-    - `slopes`: derivatives of each leaf, with one row per parameter; None if the leaf
-        depends on no parameter.
+    - `moving`: the leaves that depend on parameters, whose numbers are in `flat` `(n,)`
+        one after another; `slopes` `(m, n)`: the derivatives of these numbers.
     """
 
     model: Model
-    slopes: tuple[Float[Array, "..."] | None, ...]
+    flat: Float[Array, " n"]
+    slopes: Float[Array, "m n"]
+    moving: tuple[int, ...] = eqx.field(static=True)
 
     def by(self, columns: Int[Array, " m"], scales: Float[Array, " m"]) -> "Expansion":
         """Return the expansion in some of the parameters, in units of their scales."""
-
-        def rows(slope):
-            return slope[columns] * scales.reshape(-1, *[1] * (slope.ndim - 1))
-
-        slopes = tuple(None if s is None else rows(s) for s in self.slopes)
-        return Expansion(self.model, slopes)
+        slopes = self.slopes[columns] * scales[:, None]
+        return Expansion(self.model, self.flat, slopes, self.moving)
 
     def at(self, change: Float[Array, " m"]) -> Model:
         """Return the model after a small change of the parameters."""
         leaves, tree = jax.tree.flatten(self.model)
-        moved = [
-            leaf if slope is None else leaf + jnp.tensordot(change, slope, 1)
-            for leaf, slope in zip(leaves, self.slopes)
-        ]
-        return jax.tree.unflatten(tree, moved)
+        sizes = np.cumsum([leaves[k].size for k in self.moving])
+        # all numbers at once, because operations on each leaf compile slowly
+        parts = jnp.split(self.flat + change @ self.slopes, sizes[:-1])
+        for k, part in zip(self.moving, parts):
+            leaves[k] = part.reshape(leaves[k].shape)
+        return jax.tree.unflatten(tree, leaves)
