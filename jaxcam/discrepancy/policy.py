@@ -238,7 +238,7 @@ class Policy:
         "amplitudes tried for a function, in mean standard errors of its coefficients",
     )
     promising: float = bounds(
-        0.5, "minimum predicted gain for a fit of a function, relative to the largest"
+        0.5, "least predicted gain of a candidate, relative to the largest or the rest"
     )
     rivalling: float = bounds(
         0.9,
@@ -253,8 +253,8 @@ class Policy:
     )
     negligible_residual: float = bounds(
         0.1,
-        "the search ends if the excess cost is below this fraction of the tolerated "
-        "cost",
+        "excess cost at which the search ends, relative to the tolerated cost or to "
+        "that without the last term",
     )
     prior_fits: int = bounds(
         4, "maximum number of fits for the prior of a free function to converge"

@@ -55,4 +55,4 @@ def completing_gain(fits: FreeFits, found: Missing) -> float:
     if leaves_noise(fits, found):
         return math.inf
     left = found.fit.cost - found.problem.samples
-    return fits.policy.explains * left / heat_of(found.fit)
+    return fits.policy.promising * left / heat_of(found.fit)
