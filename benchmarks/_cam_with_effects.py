@@ -25,12 +25,12 @@ _SMALL = 1e-4
 
 
 class _Rig(NamedTuple):
-    """What a run depends on, apart from the effect's own functions.
+    """What a run depends on, apart from the functions of the effects.
 
     - `harmonics` of the contact angle; `numbers` as in `_numba_rig`.
     - `scales`: for each of `_KINDS`, a row `(middle, reach, velocity, duration, hertz,
-        size)` for the arguments of the effect and its value; `remembers`: the kind of
-        the effect with states of its own.
+        size)` for the arguments of the effect and its value; `remembers`: the place in
+        `_KINDS` of the effect with states of its own.
     - `speed` of the drive (rad/s), and the time `clock` (s) at which the record begins.
     """
 

@@ -107,24 +107,25 @@ def _added(hidden: Sequence[Hidden]) -> Hidden:
     """One effect in place of several of the same kind, at most one with memory."""
     if len(hidden) == 1:
         return hidden[0]
-    first, second, *more = hidden
+    # the states of an effect with memory depend on its own scales
+    first, second, *more = sorted(hidden, key=lambda one: -one.effect.states)
+    if second.effect.states:
+        raise ValueError("Two effects of one kind have a memory; give one of them.")
     scales, effect, other = first.scales, first.effect, second.effect
     own = second.scales
     # numba compiles functions of functions that are marked
-    values = register_jitable(effect.value), register_jitable(other.value)
-    one, another = values
+    one, another = (register_jitable(e.value) for e in (effect, other))
     share = second.unit / first.unit
     stretch, fast = scales.reach / own.reach, scales.velocity / own.velocity
     shift = (scales.middle - own.middle) / own.reach
+    # the last argument is an approach speed, or the state of an effect with memory
+    faster = fast if effect.kind == "restitution" else 1.0
 
     def value(u, w, phi, t, s):
         return one(u, w, phi, t, s) + share * another(
-            stretch * u + shift, fast * w, phi, t, s
+            stretch * u + shift, fast * w, phi, t, faster * s
         )
 
-    (memory, states), *_ = sorted(
-        ((e.memory, e.states) for e in (effect, other)), key=lambda pair: -pair[1]
-    )
     arguments = tuple(dict.fromkeys((*effect.arguments, *other.arguments)))
-    both = Effect(effect.kind, arguments, value, effect.size, memory, states)
+    both = effect._replace(arguments=arguments, value=value)
     return _added([Hidden(both, first.size, scales), *more])

@@ -54,21 +54,23 @@ def test_functions_that_explain_most_of_the_rest_are_kept(
     "left, rest, names, complete",
     [
         # a term that leaves only noise explains all, however small it is
-        (1000.0, 1300.0, {"drag"}, True),
+        (1300.0, 1000.0, {"drag"}, True),
         # if the functions leave only noise themselves, nothing is left to explain
-        (1000.0, 1005.0, {"drag"}, False),
+        (1005.0, 1000.0, {"drag"}, False),
         # more than noise remains
-        (1200.0, 3000.0, {"drag"}, False),
+        (3000.0, 1200.0, {"drag"}, False),
         # another function may only represent an error of the first
-        (1000.0, 1300.0, set(), False),
+        (1300.0, 1000.0, set(), False),
+        # with several, each must explain enough
+        (1300.0, 1000.0, {"drag", "lag"}, False),
     ],
 )
 def test_a_small_term_is_named_if_it_explains_all_that_is_left(
     left, rest, names, complete, unchecked_types
 ):
     fits: Any = types.SimpleNamespace(policy=Policy())
-    found = _found(["a"], rest)
-    more = _found(["a"], left, names=frozenset(names))
+    found = _found(["a"], left)
+    more = _found(["a"], rest, names=frozenset(names))
     assert completes(fits, found, more) is complete
 
 

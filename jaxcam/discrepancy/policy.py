@@ -251,7 +251,7 @@ class Policy:
     form_cost: float = bounds(
         1.25, "maximum cost of a form, relative to that of the function it replaces"
     )
-    negligible_residual: float = bounds(
+    negligible_residual: float = decides(
         0.1,
         "excess cost at which the search ends, relative to the tolerated cost or to "
         "that without the last term",

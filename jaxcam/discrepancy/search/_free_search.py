@@ -279,8 +279,8 @@ class FreeSearch:
                 break
             if found.functions and grown < self._worthwhile(found):
                 break
-            small = not apart and found.functions and grown < self._small(found)
-            if small and not completes(self.fits, found, best):
+            minor = not apart and found.functions and grown < self._small(found)
+            if minor and not completes(self.fits, found, best):
                 break
             found = best
         return found
@@ -328,15 +328,14 @@ class FreeSearch:
         if not leads:
             return []
         least = max(self._least(), self.policy.promising * leads[0].gain)
-        terms = enough = least
+        of_term = enough = least
         if found.functions:
             more = self._worthwhile(found) if apart else self._small(found)
-            enough = terms = max(least, more / heat_of(found.fit))
+            of_term = enough = max(least, more / heat_of(found.fit))
             if not apart:
-                terms = max(least, min(enough, completing_gain(self.fits, found)))
-        return [lead for lead in leads if lead.gain > (terms if lead.name else enough)][
-            : self.policy.followed
-        ]
+                of_term = max(least, min(enough, completing_gain(self.fits, found)))
+        kept = [one for one in leads if one.gain > (of_term if one.name else enough)]
+        return kept[: self.policy.followed]
 
     def _swapped(self, found: Missing, share: float = 0.0) -> Missing:
         room = self.rooms.of(found)

@@ -19,8 +19,10 @@ def heat_of(found: Fit) -> float:
 
 
 def tolerance_at(heat: float) -> float:
-    """Return the tolerance of a fit whose cost per sample is `heat`."""
-    return _TOLERANCE * heat
+    """Return the tolerance of a fit whose cost per sample is `heat`, which is infinite
+    if an earlier fit has failed.
+    """
+    return _TOLERANCE * (heat if math.isfinite(heat) else 1.0)
 
 
 def heated(problem: Problem, heat: float) -> Problem:

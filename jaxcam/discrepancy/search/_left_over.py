@@ -37,15 +37,16 @@ def parts_lacking(
 
 
 def completes(fits: FreeFits, found: Missing, more: Missing) -> bool:
-    """Return whether a term in addition to a fit explains all that its functions leave,
-    however little that is.
+    """Return whether a single term in addition to a fit explains all that its functions
+    leave, however little that is.
     """
-    if more.names == found.names:
+    added = len(more.names - found.names), len(more.functions) - len(found.functions)
+    if added != (1, 0):
         return False
     if leaves_noise(fits, found) or not leaves_noise(fits, more):
         return False
-    left, rest = (one.fit.cost - one.problem.samples for one in (more, found))
-    return left < fits.policy.negligible_residual * rest
+    left, rest = (one.fit.cost - one.problem.samples for one in (found, more))
+    return rest < fits.policy.negligible_residual * left
 
 
 def completing_gain(fits: FreeFits, found: Missing) -> float:

@@ -103,6 +103,6 @@ def interpolated(tables, place):
     # one slice of all tables compiles faster than a look-up for each of their numbers
     given, tree = jax.tree.flatten(tables)
     near = jax.lax.dynamic_slice_in_dim(jnp.stack(given), first.astype(int), 4, axis=1)
-    first, *more = (w * near[:, k] for k, w in enumerate(weights))
-    found = sum(more, first)
+    start, *more = (w * near[:, k] for k, w in enumerate(weights))
+    found = sum(more, start)
     return jax.tree.unflatten(tree, [found[k] for k in range(len(given))])

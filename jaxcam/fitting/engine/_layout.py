@@ -81,7 +81,7 @@ class Layout(eqx.Module):
 
         rows = jax.vmap(pushed)(jnp.eye(len(values)))
         flat = [jnp.ravel(leaves[k]) for k in moving]
-        slopes = [row.reshape(len(values), -1) for row in rows]
+        slopes = [row.reshape(len(values), one.size) for row, one in zip(rows, flat)]
         if not moving:
             flat, slopes = [jnp.zeros(0)], [jnp.zeros((len(values), 0))]
         return Expansion(
@@ -98,8 +98,9 @@ class Expansion(eqx.Module):
     The quantities needed at every step are computed and differentiated once, instead of
     in each piece.
 
-    - `moving`: the leaves that depend on parameters, whose numbers are in `flat` `(n,)`
-        one after another; `slopes` `(m, n)`: the derivatives of these numbers.
+    - `moving`: the indices of the leaves that depend on parameters; `flat` `(n,)`: the
+        numbers in these leaves, one after another; `slopes` `(m, n)`: their
+        derivatives.
     """
 
     model: Model
@@ -115,9 +116,9 @@ class Expansion(eqx.Module):
     def at(self, change: Float[Array, " m"]) -> Model:
         """Return the model after a small change of the parameters."""
         leaves, tree = jax.tree.flatten(self.model)
-        sizes = np.cumsum([leaves[k].size for k in self.moving])
+        ends = np.cumsum([leaves[k].size for k in self.moving])
         # all numbers at once, because operations on each leaf compile slowly
-        parts = jnp.split(self.flat + change @ self.slopes, sizes[:-1])
+        parts = jnp.split(self.flat + change @ self.slopes, ends[:-1])
         for k, part in zip(self.moving, parts):
             leaves[k] = part.reshape(leaves[k].shape)
         return jax.tree.unflatten(tree, leaves)
