@@ -91,7 +91,9 @@ def _divided(numbers, forms) -> Float[Array, "m p"]:
 
 @jax.jit
 def interpolated(tables, place):
-    """Return the values of splines at a position in units of their knots."""
+    """Return the values of splines at positions in units of their knots."""
+    if place.ndim:
+        return jax.vmap(interpolated, in_axes=(None, 0))(tables, place)
     first = jnp.clip(jnp.floor(place), 0, _KNOTS - 4)
     u = place - first
     weights = (
