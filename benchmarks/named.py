@@ -32,8 +32,6 @@ from jaxcam.discrepancy import diagnose
 _DRAWS = 40
 # reference speed of restitution in the library
 _IMPACT_SPEED = 0.3
-
-
 # periods of a vibration in a record
 _CYCLES = 201.3
 
@@ -115,11 +113,9 @@ def judged(found, effect: str, named: Hidden, other: Hidden | None, motions):
     wanted = [] if other is None else [other]
     right = right and len(found.missing) == len(wanted)
     for hidden, one in zip(wanted, found.missing):
-        kind, remembers = (
-            (one.kind, set(one.arguments)),
-            hidden.effect.memory is not None,
-        )
-        alike = kind == (hidden.effect.kind, set(hidden.effect.arguments))
+        true_one, remembers = hidden.effect, hidden.effect.memory is not None
+        alike = one.kind == true_one.kind
+        alike = alike and set(one.arguments) == set(true_one.arguments)
         off = math.nan if remembers or not alike else function_off(one, hidden, motions)
         said.append(f"{one.kind} by {', '.join(one.arguments)} off by {off:.2f}")
         right = right and alike and (remembers or off < 0.4)

@@ -10,7 +10,7 @@ from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.search._blocks import _usable, moved
 from jaxcam.discrepancy.search._gains import distinct_step, newton_step
 from jaxcam.discrepancy.search._left_out import LeftOut
-from jaxcam.discrepancy.search._left_over import completes, parts_lacking
+from jaxcam.discrepancy.search._unexplained import completes, parts_lacking
 
 
 def _found(functions, cost, samples=1000, score=None, names=frozenset()):

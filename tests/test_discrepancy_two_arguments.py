@@ -14,11 +14,12 @@ from swing_rig import PARAMETERS, swinging
 from jaxcam import simulate
 from jaxcam.discrepancy import Policy
 from jaxcam.discrepancy.report._bivariate import bivariate_slopes, bivariate_table
+from jaxcam.discrepancy.search import _leads as ranking
 from jaxcam.discrepancy.search._clock import Clock
 from jaxcam.discrepancy.search._earlier import _over_range
 from jaxcam.discrepancy.search._free_fits import FreeFits, Subset
 from jaxcam.discrepancy.search._free_search import FreeSearch
-from jaxcam.discrepancy.search._leads import Leads
+from jaxcam.discrepancy.search._leads import Lead, Leads
 from jaxcam.discrepancy.search._rooms import Rooms
 from jaxcam.discrepancy.search._roughness import Roughness
 from jaxcam.discrepancy.search._shuffled import shuffled
@@ -288,6 +289,43 @@ def test_no_element_is_added_to_a_force_of_two_arguments(late_spring):
     filled(rooms.of(free).whole, free.functions)
     with pytest.raises(ValueError, match="no slot 'bivariate_force'"):
         filled(rooms.with_element.whole, free.functions)
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "ranked"),
+    [
+        # the term may explain all that the force leaves
+        (400.0, 1500.0, ["a term"]),
+        # it explains less than half of the 333 that it leaves, per cost of 1.5 a sample
+        (150.0, 1500.0, ["a function", "a term"]),
+        # nothing but noise is left
+        (400.0, 1005.0, ["a function", "a term"]),
+    ],
+)
+def test_beside_a_force_of_two_arguments_terms_come_first(
+    gain, left, ranked, monkeypatch, unchecked_types
+):
+    """Other functions are ranked only if no term may explain what is left."""
+    at = _family(Variable.POSITION)
+    across = _family(Variable.VELOCITY)
+    free = Free(at, Roughness(), ROOM_OF_TWO_ARGUMENTS, across=across)
+    problem = SimpleNamespace(samples=1000)
+    fit = SimpleNamespace(cost=left, problem=problem)
+    found: Any = SimpleNamespace(
+        functions=(free,), names=frozenset(), fit=fit, problem=problem
+    )
+    fits: Any = SimpleNamespace(policy=Policy())
+    leads = Leads(fits, (), (), Policy(), lambda *said: None)
+    made = {
+        "_terms": [Lead(gain, "a term")],
+        "_in_flight": [Lead(500.0, "a function")],
+        "_elsewhere": [],
+    }
+    for name, value in made.items():
+        monkeypatch.setattr(Leads, name, lambda self, *a, value=value: iter(value))
+    monkeypatch.setattr(ranking, "_heated", lambda problem, found: problem)
+    wide: Any = problem
+    assert [one.label for one in leads.ranked(wide, found, False)] == ranked
 
 
 def test_a_single_form_that_leaves_noise_has_no_rival(late_spring):

@@ -238,7 +238,7 @@ class Policy:
         "amplitudes tried for a function, in mean standard errors of its coefficients",
     )
     promising: float = bounds(
-        0.5, "least predicted gain of a candidate, relative to the largest or the rest"
+        0.5, "least gain of a candidate, relative to the largest or to the excess cost"
     )
     rivalling: float = bounds(
         0.9,

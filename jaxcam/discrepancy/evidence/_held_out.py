@@ -10,14 +10,7 @@ import numpy as np
 from ...fitting import Fit, fit, Problem, Residuals, residuals
 from ...fitting.engine import cost_by_recording, Weights
 from ..policy import Policy
-from ..search import (
-    given_up,
-    heat_of,
-    tolerance_at,
-    Trial,
-    Trials,
-    with_states,
-)
+from ..search import given_up, heat_of, tolerance_at, Trial, Trials, with_states
 
 
 # Seed that assigns sections to parts; fixed, so that two diagnoses of a case agree

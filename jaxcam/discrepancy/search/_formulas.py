@@ -17,11 +17,11 @@ from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of
 from ._hidden_state import Hidden
 from ._leads import shows_apart
-from ._left_over import leaves_noise
 from ._named_parts import friction_named, with_named_friction
 from ._roughness import Roughness
 from ._slots import emptied, Free, Part, replaced
 from ._sums_of_forms import SumSearch
+from ._unexplained import leaves_noise
 
 
 def formulated(

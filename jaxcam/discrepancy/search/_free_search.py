@@ -24,11 +24,11 @@ from ._hidden_kinds import KINDS
 from ._hidden_leads import simplified
 from ._leads import Lead, Leads, of_two_arguments, others, tie
 from ._left_out import LeftOut
-from ._left_over import completes, completing_gain, leaves_noise, parts_lacking
 from ._recentre import recentred
 from ._rooms import Rooms
 from ._shuffled import Shuffled, shuffled
 from ._two_arguments import TwoArguments
+from ._unexplained import completes, completing_gain, leaves_noise, parts_lacking
 
 
 class FreeSearch:

@@ -17,10 +17,10 @@ from ._hidden_leads import worthwhile
 from ._hidden_scan import Promise
 from ._hidden_signals import Driven
 from ._hidden_state import Hidden
-from ._left_over import completing_gain
 from ._local_force import force_blocks, force_response, Response
 from ._roughness import Roughness, roughness
 from ._slots import filled, Free, free_term, slots_of
+from ._unexplained import completing_gain
 
 
 class Lead(NamedTuple):

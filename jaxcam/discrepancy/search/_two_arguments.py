@@ -24,7 +24,6 @@ from ._clock import Clock
 from ._free_fits import FreeFits, Missing, Subset
 from ._heat import heat_of, heated
 from ._leads import Lead
-from ._left_over import leaves_noise
 from ._local_force import force_response, forces_at_nodes
 from ._product_forms import ProductSearch, ProductStart
 from ._product_search import Products
@@ -32,6 +31,7 @@ from ._rooms import Rooms
 from ._roughness import beside, occam_of, roughness
 from ._slots import filled, Free, free_term, ROOM_OF_TWO_ARGUMENTS
 from ._starting_at import starting_at
+from ._unexplained import leaves_noise
 
 
 class Sum(NamedTuple):
